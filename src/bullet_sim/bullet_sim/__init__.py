@@ -1,0 +1,1 @@
+"""What the simulators share: Bullet client, scene, casters, grip, sensors, concealed effects."""

@@ -1,0 +1,1 @@
+"""Golem Krang in Bullet, with furniture on casters; sim_node."""

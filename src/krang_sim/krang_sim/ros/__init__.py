@@ -1,0 +1,1 @@
+"""The nodes of krang_sim: convert in, call the library, convert out."""

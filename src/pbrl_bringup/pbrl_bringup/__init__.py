@@ -1,0 +1,1 @@
+"""Command line, demo, benches and the report's web page."""
