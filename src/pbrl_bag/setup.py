@@ -13,7 +13,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["numpy", "pydantic", "pyyaml", "mcap", "mcap-ros2-support", "scipy"],
+    install_requires=["numpy", "pydantic", "pyyaml", "mcap", "mcap-ros2-support", "scipy", "zstandard", "lz4"],
     zip_safe=False,
     entry_points={
         "console_scripts": [

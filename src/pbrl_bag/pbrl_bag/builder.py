@@ -1,0 +1,261 @@
+"""Builds a Recording from messages as they come: from a bag, or live on a running graph."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pbrl_bag.decoding import poses_in, wrench_in
+from pbrl_bag.errors import BagError
+from pbrl_bag.geometry import bodies_of_mapping, bodies_of_scene, corners
+from pbrl_bag.grasps import GraspChange, change_in, grasps_from_changes, grasps_from_mapping
+from pbrl_bag.mapping import FramePose, Mapping, PoseSource, WrenchSource
+from pbrl_bag.roles import CONTRACT, Kind, Role, roles_of, topic_of
+from pbrl_bag.streams import Limits, pose_stream, read_only, wrench_stream
+from pbrl_bag.types import Array, BodyGeometry, Grasp, PoseStream, Recording, WrenchStream
+from pbrl_bag.validation import nearest
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+NEWTONS = {"N": 1.0, "lbf": 4.4482216152605, "kgf": 9.80665}
+NEWTON_METRES = {"N m": 1.0, "lbf in": 0.1129848290276167}
+
+
+@dataclass
+class Samples:
+    """What one stream has brought so far, in the units and the frame it came in.
+
+    Attributes:
+        label: what to call the stream in errors.
+        rows: (time, six or seven values) each: position and quaternion, or force and torque.
+    """
+
+    label: str
+    source: PoseSource | WrenchSource
+    rows: list[tuple[float, ...]] = field(default_factory=list)
+
+    def array(self, width: int) -> Array:
+        """Return the samples as (n, width)."""
+        return np.array(self.rows, dtype=np.float64).reshape(-1, width)
+
+
+class RecordingBuilder:
+    """Collects messages by topic and makes a checked Recording of them.
+
+    Args:
+        mapping: which topic plays which role; the contract's own topics if left out.
+    """
+
+    def __init__(self, mapping: Mapping | None = None):
+        self.mapping = mapping or CONTRACT
+        self.notes: list[str] = []
+        self._topics: dict[str, tuple[Role, ...]] = {}
+        self._samples: dict[tuple[Kind, str], Samples] = {}
+        self._changes: list[GraspChange] = []
+        self._scene: tuple[dict[str, BodyGeometry], Array] | None = None
+
+    def wants(self, topic: str) -> bool:
+        """Tell whether a topic plays a role, so that its messages are worth decoding."""
+        if topic not in self._topics:
+            self._topics[topic] = roles_of(topic, self.mapping)
+        return bool(self._topics[topic])
+
+    def add(self, topic: str, stamp_message: Any) -> None:
+        """Take one message; topics without a role are ignored.
+
+        Args:
+            topic: where it was heard.
+            stamp_message: the decoded message, a real instance or any object with the same attributes.
+
+        Raises:
+            BagError: its type or frame does not fit the topic's role.
+        """
+        if not self.wants(topic):
+            return
+        for role in self._topics[topic]:
+            if role.kind == "grasps":
+                self._changes.append(change_in(topic, stamp_message))
+            elif role.kind == "scene":
+                self._add_scene(topic, stamp_message)
+            elif isinstance(role.source, WrenchSource):
+                self._add_wrench(topic, role, role.source, stamp_message)
+            elif isinstance(role.source, PoseSource):
+                self._add_pose(topic, role, role.source, stamp_message)
+
+    def samples(self, kind: Kind, name: str, label: str, source: PoseSource | WrenchSource) -> Samples:
+        """Return the samples of a role, to be added to; empty at first."""
+        return self._samples.setdefault((kind, name), Samples(label, source))
+
+    def build(self, path: Path | str = "") -> Recording:
+        """Check what was collected and return it as a Recording.
+
+        Args:
+            path: where it came from, for errors and for `Recording.path`.
+
+        Raises:
+            BagError: a topic is missing, a stream is malformed; the message names topic, time and field.
+        """
+        path = Path(path)
+        notes = list(self.notes)
+        objects = self._poses("object_poses", notes)
+        grippers = self._poses("gripper_poses", notes)
+        wrenches = self._wrenches(notes)
+        streams: list[PoseStream | WrenchStream] = [*objects.values(), *grippers.values(), *wrenches.values()]
+        start, end = self._span(path, streams)
+        bodies, room = self._geometry(path, objects)
+        grasps = self._grasps(path, start, end)
+        for name in sorted(set(objects) - set(bodies)):
+            notes.append(f"body {name!r} is seen but has no geometry: it cannot be learned about")
+        recording = Recording(path, bodies, objects, grippers, wrenches, grasps, room, tuple(notes))
+        self._check_complete(recording)
+        return recording
+
+    def _add_scene(self, topic: str, message: Any) -> None:
+        if not (hasattr(message, "bodies") and hasattr(message, "room")):
+            raise BagError(f"{topic}: expected pbrl_msgs/Scene, got {type(message).__name__}")
+        self._scene = (bodies_of_scene(topic, message), corners(message.room))
+
+    def _add_wrench(self, topic: str, role: Role, source: WrenchSource, message: Any) -> None:
+        sample = wrench_in(topic, message)
+        contract = f"{role.name}_ft"
+        if role.name not in self.mapping.wrenches and sample.frame != contract:
+            raise BagError(
+                f"{topic}: t = {sample.time:.6f} s: header.frame_id: expected {contract!r}, got {sample.frame!r}; "
+                "say in a mapping in which axes it is given"
+            )
+        torque = (np.nan,) * 3 if source.ignore_torque else sample.torque
+        self.samples("wrenches", role.name, topic, source).rows.append((sample.time, *sample.force, *torque))
+
+    def _add_pose(self, topic: str, role: Role, source: PoseSource, message: Any) -> None:
+        expected = source.frame or self.mapping.world
+        samples = self.samples(role.kind, role.name, topic, source)
+        for sample in poses_in(topic, message, source.child_frame):
+            if sample.frame != expected:
+                raise BagError(
+                    f"{topic}: t = {sample.time:.6f} s: header.frame_id: expected {expected!r}, got {sample.frame!r}; "
+                    "say in a mapping where that frame is (`frames`, `frame`)"
+                )
+            turn = (np.nan,) * 4 if source.ignore_orientation else sample.quaternion
+            samples.rows.append((sample.time, *sample.position, *turn))
+
+    def _poses(self, kind: Kind, notes: list[str]) -> dict[str, PoseStream]:
+        """Return the checked pose streams of one kind, in world."""
+        limits = Limits(self.mapping.max_speed, self.mapping.max_turn_rate)
+        streams = {}
+        for (found, name), samples in sorted(self._samples.items()):
+            if found == kind and samples.rows and isinstance(samples.source, PoseSource):
+                rows = samples.array(8)
+                position, quaternion = self._to_world(rows[:, 1:4], rows[:, 4:8], samples)
+                streams[name] = pose_stream(samples.label, rows[:, 0], position, quaternion, limits, notes)
+        return streams
+
+    def _to_world(self, position: Array, quaternion: Array, samples: Samples) -> tuple[Array, Array]:
+        """Turn poses from the units and frame of their source to metres in world, offset included."""
+        source = samples.source
+        assert isinstance(source, PoseSource)
+        position = position * METRES[source.unit]
+        frame = self.mapping.frames.get(source.frame or self.mapping.world, FramePose())
+        if source.offset != FramePose():
+            if np.isnan(quaternion).any() and any(source.offset.position):
+                raise BagError(f"{samples.label}: offset: needs the orientation, which is not observed; leave it out")
+            position, quaternion = _compose(position, quaternion, source.offset)
+        return _place(frame, position, quaternion) if frame != FramePose() else (position, quaternion)
+
+    def _wrenches(self, notes: list[str]) -> dict[str, WrenchStream]:
+        """Return the checked wrench streams by gripper, in N and N m, in sensor or world axes."""
+        streams = {}
+        for (kind, name), samples in sorted(self._samples.items()):
+            source = samples.source
+            if kind != "wrenches" or not samples.rows or not isinstance(source, WrenchSource):
+                continue
+            rows = samples.array(7)
+            force = rows[:, 1:4] * (source.sign * NEWTONS[source.unit])
+            torque = rows[:, 4:7] * (source.sign * NEWTON_METRES[source.torque_unit])
+            if source.axes in self.mapping.frames:
+                turn = Rotation.from_quat(self.mapping.frames[source.axes].quaternion)
+                force, torque = turn.apply(force), turn.apply(torque)
+            axes = "sensor" if source.axes == "sensor" else "world"
+            streams[name] = wrench_stream(samples.label, rows[:, 0], force, torque, source.exerted_on, axes, notes)
+        return streams
+
+    def _span(self, path: Path, streams: Sequence[PoseStream | WrenchStream]) -> tuple[float, float]:
+        """Return times of the first and last sample [s]."""
+        if not streams:
+            raise self._missing(path, "object_poses", next(iter(self.mapping.object_poses), "<object>"))
+        return (
+            min(float(stream.time[0]) for stream in streams),
+            max([float(stream.time[-1]) for stream in streams] + [change.time for change in self._changes[-1:]]),
+        )
+
+    def _geometry(self, path: Path, poses: dict[str, PoseStream]) -> tuple[dict[str, BodyGeometry], Array]:
+        """Return bodies and room; what the mapping says goes before what /scene says."""
+        bodies, room = self._scene or ({}, read_only(np.empty((0, 2))))
+        bodies = bodies | bodies_of_mapping(self.mapping.bodies, poses, str(path))
+        if not bodies:
+            raise self._missing(path, "scene", "")
+        return bodies, read_only(np.array(self.mapping.room)) if self.mapping.room else room
+
+    def _grasps(self, path: Path, start: float, end: float) -> tuple[Grasp, ...]:
+        """Return who held what, when."""
+        topic = topic_of("grasps", "", self.mapping)
+        if self.mapping.grasps:
+            return grasps_from_mapping(self.mapping.grasps, start, end)
+        if not self._changes:
+            raise self._missing(path, "grasps", "")
+        return grasps_from_changes(topic, self._changes, end)
+
+    def _check_complete(self, recording: Recording) -> None:
+        """Raise a BagError where something that was grasped lacks what is needed to learn from it."""
+        for grasp in recording.grasps:
+            if grasp.object not in recording.bodies:
+                raise BagError(
+                    f"{recording.path}: t = {grasp.start:.6f} s: gripper {grasp.gripper!r} holds {grasp.object!r}, "
+                    f"which has no geometry; {nearest(grasp.object, sorted(recording.bodies))}"
+                )
+            if grasp.object not in recording.object_poses:
+                raise self._missing(recording.path, "object_poses", grasp.object)
+            if grasp.gripper not in recording.wrenches:
+                raise self._missing(recording.path, "wrenches", grasp.gripper)
+            in_sensor_axes = recording.wrenches[grasp.gripper].frame == "sensor"
+            if in_sensor_axes and grasp.gripper not in recording.gripper_poses:
+                raise self._missing(recording.path, "gripper_poses", grasp.gripper)
+
+    def _missing(self, path: Path, kind: Kind, name: str) -> BagError:
+        """Return the error that a role is not filled."""
+        topic = topic_of(kind, name, self.mapping)
+        role = f"{kind}.{name}" if name else kind
+        heard = sorted(self._topics)
+        there = f"the recording has {_listing(heard)}" if heard else "the recording has no topics"
+        expected = f"topic {topic!r} ({role})" if topic else f"a source of {role}"
+        return BagError(f"{path}: expected {expected}, got no message of it; {there}; record it or give a mapping")
+
+
+def _listing(names: list[str], most: int = 8) -> str:
+    """Return names as a list that stays on one line."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def _compose(position: Array, quaternion: Array, offset: FramePose) -> tuple[Array, Array]:
+    """Return poses of a frame that sits at `offset` in the frames given."""
+    seen = ~np.isnan(quaternion).any(axis=1)
+    position, quaternion = position.copy(), quaternion.copy()
+    if seen.any():
+        turn = Rotation.from_quat(quaternion[seen])
+        position[seen] += turn.apply(np.array(offset.position))
+        quaternion[seen] = (turn * Rotation.from_quat(offset.quaternion)).as_quat()
+    return position, quaternion
+
+
+def _place(frame: FramePose, position: Array, quaternion: Array) -> tuple[Array, Array]:
+    """Return in world what was given in `frame`."""
+    turn = Rotation.from_quat(frame.quaternion)
+    seen = ~np.isnan(quaternion).any(axis=1)
+    quaternion = quaternion.copy()
+    if seen.any():
+        quaternion[seen] = (turn * Rotation.from_quat(quaternion[seen])).as_quat()
+    return turn.apply(position) + np.array(frame.position), quaternion

@@ -1,0 +1,163 @@
+"""metadata.yaml of a bag folder, as `ros2 bag info` and `ros2 bag play` of Jazzy read it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pbrl_bag.errors import BagError
+from pbrl_bag.qos import Qos, qos_from_metadata
+
+FILE_NAME = "metadata.yaml"
+VERSION = 9
+
+
+@dataclass
+class TopicMetadata:
+    """One topic of a bag."""
+
+    name: str
+    type: str
+    qos: tuple[Qos, ...]
+    type_hash: str = ""
+    count: int = 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the topic's entry in topics_with_message_count."""
+        return {
+            "topic_metadata": {
+                "name": self.name,
+                "type": self.type,
+                "serialization_format": "cdr",
+                "offered_qos_profiles": [qos.to_metadata() for qos in self.qos],
+                "type_description_hash": self.type_hash,
+            },
+            "message_count": self.count,
+        }
+
+
+@dataclass
+class BagMetadata:
+    """What metadata.yaml says of a bag of one file; times in nanoseconds."""
+
+    file: str
+    ros_distro: str = "jazzy"
+    start: int | None = None
+    end: int | None = None
+    topics: dict[str, TopicMetadata] = field(default_factory=dict)
+
+    def count(self, topic: str, log_time: int) -> None:
+        """Take note of one message."""
+        self.topics[topic].count += 1
+        self.start = log_time if self.start is None else min(self.start, log_time)
+        self.end = log_time if self.end is None else max(self.end, log_time)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the whole document."""
+        start = self.start or 0
+        duration = 0 if self.end is None else self.end - start
+        total = sum(topic.count for topic in self.topics.values())
+        span = {"duration": {"nanoseconds": duration}, "starting_time": {"nanoseconds_since_epoch": start}}
+        return {
+            "rosbag2_bagfile_information": {
+                "version": VERSION,
+                "storage_identifier": "mcap",
+                **span,
+                "message_count": total,
+                "topics_with_message_count": [topic.to_dict() for topic in self.topics.values()],
+                "compression_format": "",
+                "compression_mode": "",
+                "relative_file_paths": [self.file],
+                "files": [{"path": self.file, **span, "message_count": total}],
+                "custom_data": None,
+                "ros_distro": self.ros_distro,
+            }
+        }
+
+
+def record_text(document: dict[str, Any]) -> str:
+    """Return what rosbag2 keeps in the file itself, so that the file alone can be asked as well."""
+    information = document["rosbag2_bagfile_information"]
+    return yaml.dump(information, Dumper=_Dumper, sort_keys=False, default_flow_style=False)
+
+
+def write_metadata(folder: Path, document: dict[str, Any]) -> None:
+    """Replace metadata.yaml in one step: a reader sees the old one or the new one, whole."""
+    part = folder / f".{FILE_NAME}.part"
+    with part.open("w", encoding="utf-8") as file:
+        yaml.dump(document, file, Dumper=_Dumper, sort_keys=False, default_flow_style=False)
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(folder / FILE_NAME)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes repeated values out: yaml-cpp, which reads this, is not to meet anchors."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def read_metadata(folder: Path) -> dict[str, Any]:
+    """Return the information part of a bag's metadata.yaml.
+
+    Raises:
+        BagError: there is none, or it is not what rosbag2 writes.
+    """
+    path = folder / FILE_NAME
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BagError(f"{path}: expected a bag's metadata, {error.strerror or error}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise BagError(f"{path}: expected YAML, got: {error}") from error
+    information = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
+    if not isinstance(information, dict):
+        raise BagError(f"{path}: expected key rosbag2_bagfile_information, got none; read the .mcap file itself")
+    return information
+
+
+def files_of_bag(folder: Path) -> tuple[Path, ...]:
+    """Return the MCAP files of a bag folder, in order.
+
+    Raises:
+        BagError: no MCAP file, another storage, or a file that metadata.yaml names is not there.
+    """
+    if not (folder / FILE_NAME).exists():
+        files = sorted(folder.glob("*.mcap"))
+        if not files:
+            raise BagError(f"{folder}: expected {FILE_NAME} and .mcap files, got neither; is it a bag?")
+        return tuple(files)
+    information = read_metadata(folder)
+    if (storage := information.get("storage_identifier")) != "mcap":
+        raise BagError(f"{folder}: expected storage mcap, got {storage!r}; convert it with `ros2 bag convert`")
+    files = [folder / str(name) for name in information.get("relative_file_paths") or []]
+    for path in files:
+        if not path.exists():
+            raise BagError(f"{folder}: expected {path.name}, which {FILE_NAME} names, got no such file")
+    if not files:
+        raise BagError(f"{folder}: expected relative_file_paths in {FILE_NAME}, got none")
+    return tuple(files)
+
+
+def qos_text(profiles: tuple[Qos, ...]) -> str:
+    """Return offered QoS as the YAML text that rosbag2 keeps in a channel's metadata."""
+    entries = [qos.to_metadata() for qos in profiles]
+    return yaml.dump(entries, Dumper=_Dumper, sort_keys=False, default_flow_style=False).rstrip() if entries else ""
+
+
+def qos_from_text(text: str, where: str) -> tuple[Qos, ...]:
+    """Read what `qos_text` wrote, or what rosbag2 did.
+
+    Raises:
+        BagError: not a list of profiles.
+    """
+    try:
+        entries = yaml.safe_load(text) if text else []
+        return tuple(qos_from_metadata(entry) for entry in entries or [])
+    except (yaml.YAMLError, AttributeError, TypeError, KeyError, ValueError) as error:
+        raise BagError(f"{where}: offered_qos_profiles: expected a list of QoS profiles, got: {error}") from error

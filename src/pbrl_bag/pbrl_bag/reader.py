@@ -1,0 +1,112 @@
+"""Reads a recording from a bag folder, an MCAP file, or a CSV file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from mcap.records import Channel
+from mcap_ros2.decoder import DecoderFactory
+
+from pbrl_bag.builder import RecordingBuilder
+from pbrl_bag.csv_reader import read_csv
+from pbrl_bag.errors import BagError
+from pbrl_bag.mapping import Mapping, load_mapping
+from pbrl_bag.mcap_file import McapFile, RawMessage
+from pbrl_bag.metadata import files_of_bag
+from pbrl_bag.types import Recording
+
+
+def read_recording(path: Path | str, mapping: Path | str | None = None) -> Recording:
+    """Read a recording.
+
+    A file that a crash cut short is read up to its last finished chunk; `Recording.notes` says how
+    much was lost.
+
+    Args:
+        path: a bag folder, an .mcap file, or a .csv file.
+        mapping: a mapping file; needed for CSV and for bags whose topics are not the contract's.
+
+    Raises:
+        BagError: anything missing or malformed, in one line that names file, topic, time and field.
+    """
+    path = Path(path)
+    rules = None if mapping is None else load_mapping(mapping)
+    files = files_of(path)
+    if path.suffix.lower() != ".csv":
+        return _read_mcap(path, files, rules)
+    if rules is None:
+        raise BagError(f"{path}: a CSV file needs a mapping that names its columns; see config/mappings/")
+    return read_csv(path, rules)
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Return the files that make up a recording.
+
+    Raises:
+        BagError: nothing there, or a folder that is no bag.
+    """
+    if not path.exists():
+        raise BagError(f"{path}: expected a bag folder, an .mcap file or a .csv file, got nothing of that name")
+    return files_of_bag(path) if path.is_dir() else (path,)
+
+
+class Decoder:
+    """Turns raw messages of one file into objects with their fields as attributes."""
+
+    def __init__(self, file: McapFile):
+        self._file = file
+        self._factory = DecoderFactory()
+        self._decoders: dict[int, Callable[[bytes], Any]] = {}
+
+    def decode(self, message: RawMessage) -> Any:
+        """Decode one message.
+
+        Raises:
+            BagError: its schema or its bytes cannot be understood; names topic and time.
+        """
+        try:
+            if message.channel not in self._decoders:
+                self._decoders[message.channel] = self._decoder(self._file.channels[message.channel])
+            return self._decoders[message.channel](message.data)
+        except BagError:
+            raise
+        except Exception as error:  # the decoder follows a stranger's schema: it can fail in any way
+            raise BagError(
+                f"{self._file.path}: {message.topic}: t = {message.log_time / 1e9:.6f} s: expected a {message.type}, "
+                f"got {len(message.data)} bytes that do not decode: {error}"
+            ) from error
+
+    def _decoder(self, channel: Channel) -> Callable[[bytes], Any]:
+        """Return the decoder of a channel."""
+        schema = self._file.schemas.get(channel.schema_id)
+        decoder = self._factory.decoder_for(channel.message_encoding, schema)
+        if decoder is None:
+            encoding = schema.encoding if schema else "no"
+            raise BagError(
+                f"{self._file.path}: {channel.topic}: expected CDR with a ros2msg schema, got encoding "
+                f"{channel.message_encoding!r} with {encoding} schema; record it with storage mcap"
+            )
+        return decoder
+
+
+def _read_mcap(path: Path, files: tuple[Path, ...], rules: Mapping | None) -> Recording:
+    """Read the messages that play a role, in the order in which they were heard."""
+    builder = RecordingBuilder(rules)
+    total = 0
+    for name in files:
+        file = McapFile(name)
+        wanted = []
+        for message in file.messages():
+            total += 1
+            if builder.wants(message.topic):
+                wanted.append(message)
+        decoder = Decoder(file)
+        for message in sorted(wanted, key=lambda one: one.log_time):
+            builder.add(message.topic, decoder.decode(message))
+        builder.notes += file.notes
+    if total == 0:
+        why = builder.notes[-1] if builder.notes else "it was finished without one"
+        raise BagError(f"{path}: expected messages, got none: {why}")
+    return builder.build(path)
