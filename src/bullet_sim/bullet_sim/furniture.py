@@ -1,0 +1,73 @@
+"""A body of the scene as it stands in Bullet: where its tag frame is, and what edge a gripper can clamp."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bullet_sim.casters import Casters
+from bullet_sim.catalogue import Block, Fixture, OfficeTable
+from bullet_sim.client import BulletClient, Pose, Twist, cross
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A flat part whose edge can be clamped, in the body's tag frame.
+
+    Attributes:
+        outline: (k, 2) [m], counter-clockwise.
+        top: height [m] of the upper face over the tag frame.
+        bottom: height [m] of the lower face over the tag frame.
+    """
+
+    outline: Array
+    top: float
+    bottom: float
+
+
+class Furniture:
+    """One body of the scene.
+
+    Attributes:
+        name: in the scene.
+        settings: what the scene says of it.
+        slab: what can be clamped; None where nothing can.
+        casters: its casters; None where it has none.
+    """
+
+    def __init__(
+        self,
+        client: BulletClient,
+        name: str,
+        settings: OfficeTable | Block | Fixture,
+        tag: Array,
+        *,
+        slab: Slab | None = None,
+        casters: Casters | None = None,
+    ) -> None:
+        """Take note of a body that is in the client already; `tag` (3,) [m] is the tag in the base's own frame."""
+        self.name, self.settings, self.slab, self.casters = name, settings, slab, casters
+        self._client, self._tag = client, tag
+
+    def pose(self) -> Pose:
+        """Give the pose of the tag frame: at the top of the body."""
+        centre = self._client.centre_pose(self.name)
+        return Pose(centre.point(self._tag), centre.quaternion)
+
+    def twist(self) -> Twist:
+        """Give the velocity of the tag frame's origin and the angular velocity."""
+        centre, motion = self._client.centre_pose(self.name), self._client.centre_twist(self.name)
+        return Twist(motion.linear + cross(motion.angular, centre.matrix @ self._tag), motion.angular)
+
+    def apply_force(self, force: Array, point: Array) -> None:
+        """Push with `force` (3,) [N] at `point` (3,) [m], both in `world`, during the next step."""
+        self._client.apply_force(self.name, -1, force, point)
+
+    def update(self) -> None:
+        """Do what has to be done before each step."""
+        if self.casters is not None:
+            self.casters.update()

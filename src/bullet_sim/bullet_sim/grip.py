@@ -1,0 +1,172 @@
+"""A closed gripper: two compliant rubber plates that hold a table's edge, and slip when they are asked too much.
+
+Rubber is an elastic bristle in three translations and one turn about the plates' normal. In the plane of the
+plates the elastic load lies within a limit surface that couples force and moment,
+
+    (|f| / f_max)^2 + (tau / tau_max)^2 <= 1,        f_max = 2 mu F,
+
+beyond which the plates slip: load and deflection stay on the surface and the bristle's root is dragged along the
+edge. Across the plates the rubber is squeezed and does not slip. When too little of the edge is left between the
+plates, or it has left the opening, the grasp is lost.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bullet_sim.clamp import Clamp, GripperSpec, held_interval
+from bullet_sim.client import BulletClient, Pose, Twist, cross
+from bullet_sim.errors import SimError
+from bullet_sim.furniture import Furniture
+from bullet_sim.quiet import bullet
+
+Array = NDArray[np.float64]
+
+REFERENCE_MASS = 5.0
+"""Mass [kg] for which the rubber's damping ratio is meant: about what an arm shows at its wrist."""
+
+LAST_HOLD = 0.005
+"""Depth [m] of edge between the plates below which a slipping grasp is lost."""
+
+
+@dataclass(frozen=True)
+class GripLoad:
+    """What a grip does to its object, as applied for one step.
+
+    Attributes:
+        force: (3,) [N] on the object, `world` axes.
+        torque: (3,) [N m] on the object at `point`, `world` axes.
+        point: (3,) [m] middle of the clamped patch in `world`.
+        slipping: whether the plates slip.
+    """
+
+    force: Array
+    torque: Array
+    point: Array
+    slipping: bool
+
+
+class Grip:
+    """A gripper closed on an edge; call `apply` before each step of the world.
+
+    Attributes:
+        clamp: the edge as it was when the plates closed.
+        load: what was applied last.
+        slipped: way [m] the plates have slid over the edge so far.
+        lost: whether the edge has left the plates; nothing is applied from then on.
+    """
+
+    def __init__(
+        self, client: BulletClient, gripper: tuple[str, int], spec: GripperSpec, body: Furniture, clamp: Clamp
+    ) -> None:
+        """Close the plates.
+
+        Args:
+            client: the world.
+            gripper: name of the robot and number of the link that carries the plates.
+            spec: the plates.
+            body: what is held.
+            clamp: where, from `find_clamp` with the same poses.
+
+        Raises:
+            SimError: the clamp is of another body, or the body has no edge.
+        """
+        if body.slab is None or clamp.body != body.name:
+            raise SimError(f"grip: expected a clamp on an edge of {body.name!r}, got one on {clamp.body!r}")
+        self.clamp, self.slipped, self.lost = clamp, 0.0, False
+        self._client, self._gripper, self._spec, self._body = client, gripper, spec, body
+        self._slab = body.slab
+        self._hand = spec.along(clamp.reach)  # where the bristle ends, in the gripper's frame
+        self._root = clamp.contact.copy()  # where it begins, in the body's tag frame
+        self._turn = self._relative_turn(self._gripper_state()[0], body.pose())
+        self._damping = 2 * spec.damping * math.sqrt(spec.stiffness * REFERENCE_MASS)
+        self._lever2 = (spec.plate_width**2 + clamp.depth**2) / 12  # of a patch that carries evenly [m^2]
+        self.load = GripLoad(np.zeros(3), np.zeros(3), body.pose().point(self._root), False)
+
+    def _gripper_state(self) -> tuple[Pose, Twist]:
+        return self._client.link_twist(*self._gripper)
+
+    @staticmethod
+    def _relative_turn(gripper: Pose, body: Pose) -> float:
+        """Give the gripper's turn [rad] about the body's vertical, from any fixed start."""
+        axis = body.matrix.T @ gripper.matrix[:, 1]
+        return math.atan2(axis[1], axis[0])
+
+    def apply(self) -> GripLoad:
+        """Push gripper and object apart or together for the next step, and let the plates slip if they must.
+
+        Returns:
+            What acts on the object; zeros once the grasp is lost.
+        """
+        hand_pose, hand_twist = self._gripper_state()
+        pose, twist = self._body.pose(), self._body.twist()
+        if not self.lost:
+            self._lose_if_out(hand_pose, pose)
+        if self.lost:
+            self.load = GripLoad(np.zeros(3), np.zeros(3), hand_pose.point(self._hand), False)
+            return self.load
+        point = hand_pose.point(self._hand)
+        turn_back = pose.matrix.T
+        stretch = pose.inverse_point(point) - self._root
+        hand_speed = hand_twist.linear + cross(hand_twist.angular, point - hand_pose.position)
+        body_speed = twist.linear + cross(twist.angular, point - pose.position)
+        speed = turn_back @ (hand_speed - body_speed)
+        twisted = _wrap(self._relative_turn(hand_pose, pose) - self._turn)
+        spin = float((turn_back @ (hand_twist.angular - twist.angular))[2])
+        force, torque, slipping = self._rubber(stretch, speed, twisted, spin)
+        self.load = GripLoad(pose.matrix @ force, pose.matrix @ [0.0, 0.0, torque], point, slipping)
+        self._push()
+        return self.load
+
+    def _rubber(self, stretch: Array, speed: Array, twisted: float, spin: float) -> tuple[Array, float, bool]:
+        """Give force (3,) and torque on the object in its own axes; slip by moving the bristle's root."""
+        spec, k, c = self._spec, self._spec.stiffness, self._damping
+        fraction = min(1.0, 1 / max(self._surface(k * stretch, k * self._lever2 * twisted), 1e-12))
+        slipping = fraction < 1
+        if slipping:
+            give = np.array([*(1 - fraction) * stretch[:2], 0.0])
+            self._root = self._root + give
+            self._turn += (1 - fraction) * twisted
+            self.slipped += float(np.hypot(give[0], give[1]))
+            stretch, twisted = stretch - give, fraction * twisted
+        force = k * stretch + c * speed
+        torque = self._lever2 * (k * twisted + c * spin)
+        back = max(1.0, self._surface(force, torque))
+        across = float(np.clip(force[2], -2 * spec.force, 2 * spec.force))
+        return np.array([force[0] / back, force[1] / back, across]), torque / back, slipping
+
+    def _surface(self, force: Array, torque: float) -> float:
+        """Give how far a load is out on the limit surface: 1 on it, more beyond."""
+        limit = self._spec.force_limit
+        return math.hypot(force[0] / limit, force[1] / limit, torque / self._spec.torque_limit)
+
+    def _push(self) -> None:
+        """Hand the load to Bullet: on the object, and its opposite on the gripper."""
+        api, load, (robot, link) = self._client.api, self.load, self._gripper
+        body, number = self._client.body(self._body.name), self._client.body(robot)
+        self._body.apply_force(load.force, load.point)
+        api.applyExternalTorque(body, -1, load.torque.tolist(), bullet.WORLD_FRAME)
+        self._client.apply_force(robot, link, -load.force, load.point)
+        api.applyExternalTorque(number, link, (-load.torque).tolist(), bullet.WORLD_FRAME)
+
+    def _lose_if_out(self, hand: Pose, body: Pose) -> None:
+        """Take note when the edge has left the plates: along them, or across."""
+        spec = self._spec
+        start = body.inverse_point(hand.point(spec.along(spec.plate_start)))
+        end = body.inverse_point(hand.point(spec.along(spec.plate_end)))
+        if self.load.slipping:
+            low, high = held_interval(self._slab.outline, start, end)
+            if (high - low) * (spec.plate_end - spec.plate_start) < LAST_HOLD:
+                self.lost = True
+        across = abs(float(body.inverse_point(hand.point(self._hand))[2] - self._root[2]))
+        if across > spec.opening / 2:
+            self.lost = True
+
+
+def _wrap(angle: float) -> float:
+    """Bring an angle [rad] into [-pi, pi)."""
+    return (angle + math.pi) % (2 * math.pi) - math.pi

@@ -1,0 +1,237 @@
+"""A scene: room, furniture, robot start, goal, sensors, and what is true but not told.
+
+Everything is in `world` (x, y, theta) or in a body's own frame: x forward, y left, origin where the body's
+tag is glued. Files are `config/scenes/*.yaml`; a fault in one is a `SimError` naming file, key and remedy.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Self
+
+import numpy as np
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from pydantic import Field, model_validator
+from shapely.geometry import Point, Polygon
+
+from bullet_sim.catalogue import Block, Body, Fixture, OfficeTable
+from bullet_sim.errors import SimError, nearest
+from bullet_sim.settings import (
+    Fraction,
+    NonNegative,
+    Outline,
+    Positive,
+    Settings,
+    Vector3,
+    read_settings,
+)
+
+
+class Room(Settings):
+    """The floor and its walls.
+
+    Attributes:
+        outline: corners [m] of the free floor in `world`.
+        wall_height: [m].
+        floor_friction: factor on every sliding friction against this floor; 1 is the hard office floor.
+    """
+
+    outline: Outline
+    wall_height: Positive = 1.0
+    floor_friction: Annotated[float, Field(gt=0, le=2)] = 1.0
+
+
+class Posture(Settings):
+    """Joint angles [rad] of Krang's upper body; the right arm mirrors the left where it is not given."""
+
+    waist: float
+    torso: float = 0.0
+    left: tuple[float, float, float, float, float, float, float]
+    right: tuple[float, float, float, float, float, float, float] | None = None
+
+
+class RobotStart(Settings):
+    """Where the robot's `base` stands at the start, and its posture: a name the robot knows, or joint angles."""
+
+    pose: Vector3 = (0.0, 0.0, 0.0)
+    posture: str | Posture = "square_table_push"
+
+
+class Goal(Settings):
+    """Where an object is wanted: pose (x, y, theta) and the slack around it [m], [rad]."""
+
+    object: str
+    pose: Vector3
+    position_tolerance: Positive = 0.05
+    yaw_tolerance: Positive = 0.10
+
+
+class TagSettings(Settings):
+    """Overhead camera that reads tags; defaults are an estimate for one ceiling camera.
+
+    Attributes:
+        rate: [Hz].
+        sigma_xy: white noise of x and y [m].
+        sigma_z: white noise of the height [m].
+        sigma_yaw: white noise of the heading [rad].
+        sigma_tilt: white noise of roll and pitch [rad]: a flat tag seen from above shows them worse than its yaw.
+        latency: from capture to publication [s].
+        dropout: probability that one reading of one tag fails.
+        bias: amplitude [m] of the smooth error over the floor (calibration, lens, height).
+        bias_length: distance [m] over which that error changes.
+    """
+
+    rate: Annotated[float, Field(gt=0, le=200)] = 15.0
+    sigma_xy: NonNegative = 0.003
+    sigma_z: NonNegative = 0.006
+    sigma_yaw: NonNegative = float(np.deg2rad(0.5))
+    sigma_tilt: NonNegative = float(np.deg2rad(1.0))
+    latency: Annotated[float, Field(ge=0, le=2)] = 0.075
+    dropout: Fraction = 0.02
+    bias: NonNegative = 0.008
+    bias_length: Positive = 1.0
+
+
+class WristSettings(Settings):
+    """Wrist force-torque sensor, in its own axes with y along the gripper; defaults: Mini45 SI-290-10 on Krang.
+
+    Attributes:
+        rate: [Hz].
+        force_noise: white noise [N].
+        torque_noise: white noise [N m].
+        force_bias: bound [N] of the constant offset of each run.
+        torque_bias: bound [N m] of the constant offset of each run.
+        force_resolution: quantisation step [N].
+        torque_resolution: quantisation step [N m].
+        force_range: where the sensor saturates [N].
+        torque_range: where the sensor saturates [N m].
+    """
+
+    rate: Annotated[float, Field(gt=0, le=1000)] = 100.0
+    force_noise: tuple[NonNegative, NonNegative, NonNegative] = (0.06, 0.11, 0.06)
+    torque_noise: tuple[NonNegative, NonNegative, NonNegative] = (0.006, 0.009, 0.006)
+    force_bias: NonNegative = 1.5
+    torque_bias: NonNegative = 0.05
+    force_resolution: NonNegative = 1 / 8
+    torque_resolution: NonNegative = 1 / 376
+    force_range: tuple[Positive, Positive, Positive] = (290.0, 580.0, 290.0)
+    torque_range: tuple[Positive, Positive, Positive] = (10.0, 10.0, 10.0)
+
+
+class Sensors(Settings):
+    """What the robot senses with."""
+
+    tags: TagSettings = TagSettings()
+    wrist_ft: WristSettings = WristSettings()
+
+
+class Concealed(Settings):
+    """What is true and not told; never on a topic, never in a recording. One key an effect, each by body name.
+
+    Attributes:
+        locked_casters: names of the casters whose wheel and swivel are both braked.
+        mass: true mass [kg] where it is not the nominal one.
+        rolling_resistance: true lever f [m] of all casters of a body where it is not its `casters`' one.
+    """
+
+    locked_casters: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    mass: dict[str, Positive] = Field(default_factory=dict)
+    rolling_resistance: dict[str, NonNegative] = Field(default_factory=dict)
+
+
+class Scene(Settings):
+    """One scene, known and concealed parts together."""
+
+    name: str = "scene"
+    room: Room
+    robot: RobotStart = RobotStart()
+    bodies: dict[str, Body] = Field(default_factory=dict)
+    goal: Goal | None = None
+    sensors: Sensors = Sensors()
+    concealed: Concealed = Concealed()
+
+    @model_validator(mode="after")
+    def _names_meet(self) -> Self:
+        if self.goal is not None:
+            self._known_body(self.goal.object, "goal.object")
+        for effect in type(self.concealed).model_fields:
+            for name in getattr(self.concealed, effect):
+                self._known_body(name, f"concealed.{effect}")
+        for name, locked in self.concealed.locked_casters.items():
+            swivels = self._table(name, "locked_casters").swivels
+            for caster in locked:
+                if caster not in swivels:
+                    raise ValueError(
+                        f"concealed.locked_casters.{name}: no caster {caster!r}; {nearest(caster, swivels)}"
+                    )
+        for name in self.concealed.rolling_resistance:
+            self._table(name, "rolling_resistance")
+        return self
+
+    @model_validator(mode="after")
+    def _stands_free(self) -> Self:
+        floor = Polygon(self.room.outline).buffer(1e-6)
+        if not floor.contains(Point(self.robot.pose[:2])):
+            raise ValueError(f"robot.pose: expected a start in the room, got {list(self.robot.pose)}")
+        placed: dict[str, Polygon] = {}
+        for name, body in self.bodies.items():
+            shape = placed_footprint(body)
+            if not floor.contains(shape):
+                raise ValueError(f"bodies.{name}: expected a place inside the room, got pose {list(body.pose)}")
+            for other, place in placed.items():
+                spans = (body.levels, self.bodies[other].levels)
+                meet = max(low for low, _ in spans) < min(high for _, high in spans)
+                if meet and shape.intersection(place).area > 1e-6:
+                    raise ValueError(f"bodies.{name}: expected a place of its own, got one that overlaps {other}")
+            placed[name] = shape
+        return self
+
+    def _known_body(self, name: str, place: str) -> None:
+        if name not in self.bodies:
+            raise ValueError(f"{place}: no body {name!r} in this scene; {nearest(name, self.bodies)}")
+
+    def _table(self, name: str, effect: str) -> OfficeTable:
+        body = self.bodies[name]
+        if not isinstance(body, OfficeTable):
+            raise ValueError(f"concealed.{effect}.{name}: expected a body on casters, got a {body.kind}")
+        return body
+
+
+def placed_footprint(body: OfficeTable | Block | Fixture) -> Polygon:
+    """Give a body's footprint at its starting pose in `world`."""
+    x, y, theta = body.pose
+    cos, sin = np.cos(theta), np.sin(theta)
+    return Polygon(body.footprint @ np.array([[cos, sin], [-sin, cos]]) + [x, y])
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read a scene.
+
+    Args:
+        path: a YAML file, or the bare name of a scene that comes with the workspace.
+
+    Raises:
+        SimError: no such scene, or a fault in it; one line naming file, key and nearest known key.
+    """
+    file = Path(path)
+    if file.suffix not in (".yaml", ".yml") and not file.exists():
+        file = _shipped(str(path))
+    scene = read_settings(file, Scene)
+    return scene if "name" in scene.model_fields_set else scene.model_copy(update={"name": file.stem})
+
+
+def scene_folder() -> Path:
+    """Give the folder of the scenes that come with the workspace; raise SimError where it is not built."""
+    try:
+        return Path(get_package_share_directory("pbrl_config")) / "scenes"
+    except PackageNotFoundError as error:
+        raise SimError(
+            "scenes: expected the package pbrl_config, found none; build and source the workspace"
+        ) from error
+
+
+def _shipped(name: str) -> Path:
+    known = {file.stem: file for file in scene_folder().glob("*.yaml")}
+    if name not in known:
+        raise SimError(f"scene {name!r}: expected a file or the name of a scene; {nearest(name, known)}")
+    return known[name]
