@@ -1,0 +1,151 @@
+"""One run of Krang in a scene: commands in, physics, observations out. No ROS, no threads, no wall clock.
+
+Same scene, same seed and same commands at the same steps: same observations, bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+
+from bullet_sim.client import STEP, BulletClient
+from bullet_sim.scene import Posture as PostureSettings
+from bullet_sim.scene import Scene
+from bullet_sim.world import BodyTruth, World
+from krang_sim.commands import CommandWatchdog
+from krang_sim.grippers import GraspOutcome, Grippers, no_such_side
+from krang_sim.observations import GraspState, Observation
+from krang_sim.postures import Posture, mirrored, posture
+from krang_sim.robot import BODY_JOINTS, SIDES, Krang
+from krang_sim.sensing import Sensing
+
+
+class KrangSession:
+    """Krang and furniture, one physics step at a time.
+
+    Attributes:
+        world: the scene in Bullet.
+        robot: the robot in it.
+        tagged: names of the bodies that wear a tag.
+    """
+
+    def __init__(self, scene: Scene, *, seed: int, gui: bool = False, step: float = STEP) -> None:
+        """Build the scene and put the robot into it.
+
+        Args:
+            scene: what to build, concealed part included.
+            seed: of every random draw. World and sensors draw from streams of their own.
+            gui: open Bullet's window.
+            step: physics step [s].
+
+        Raises:
+            SimError: a scene that cannot be built, an unknown posture, a bad step.
+        """
+        world_seed, sensor_seed = np.random.SeedSequence(seed).spawn(2)
+        self._client = BulletClient(step=step, gui=gui)
+        try:
+            self.world = World(self._client, scene, np.random.default_rng(world_seed))
+            self.robot = Krang(self._client, scene.robot.pose, _start_posture(scene.robot.posture))
+            self._sensing = Sensing(self.world, self.robot, np.random.default_rng(sensor_seed))
+        except BaseException:
+            self._client.close()
+            raise
+        self.tagged = self._sensing.tagged
+        self._commands = CommandWatchdog({"base": 2, "left": 7, "right": 7, "body": 2})
+        self._grippers = Grippers(self.world, self.robot)
+        self._news: list[Observation] = self._sensing.latched()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the start."""
+        return self._client.time
+
+    def command_base(self, v: float, w: float) -> None:
+        """Ask for a speed forward [m/s] and a rate of turning left [rad/s]; holds for `commands.TIMEOUT`.
+
+        Raises:
+            KrangError: a value that is not finite; as for the other commands, the one before stays in force.
+        """
+        self._commands.set("base", (v, w), self.time)
+
+    def command_arm(self, side: str, velocity: Sequence[float]) -> None:
+        """Ask for the velocities (7,) [rad/s] of an arm's joints; holds for `commands.TIMEOUT`."""
+        self._commands.set(_known_side(side), velocity, self.time)
+
+    def command_body(self, waist: float, torso: float) -> None:
+        """Ask for the velocities [rad/s] of waist and torso; holds for `commands.TIMEOUT`."""
+        self._commands.set("body", (waist, torso), self.time)
+
+    def grasp(self, side: str, object_name: str = "") -> GraspOutcome:
+        """Close the gripper `side` on `object_name`, or, without a name, on the edge between its plates.
+
+        Returns:
+            Success, or a refusal with the distance to the nearest edge.
+        """
+        return self._told(self._grippers.grasp(side, object_name))
+
+    def release(self, side: str) -> GraspOutcome:
+        """Open the gripper `side`."""
+        return self._told(self._grippers.release(side))
+
+    def _told(self, outcome: GraspOutcome) -> GraspOutcome:
+        if outcome.success:
+            self._tell_grasps()
+        return outcome
+
+    def _tell_grasps(self) -> None:
+        self._news.append(GraspState(self.time, self._grippers.holds()))
+
+    def step(self) -> list[Observation]:
+        """Advance by one physics step.
+
+        Returns:
+            What is published now, in the order of their topics' rates; with the first step also what is known from
+            the start (description, scene, static frames, no grasps), stamped zero.
+        """
+        now = self.time
+        self.robot.command_base(*self._commands.current("base", now))
+        self.robot.command_joints(BODY_JOINTS[0], self._commands.current("body", now))
+        for side in SIDES:
+            self.robot.command_joints(f"{side[0].upper()}J1", self._commands.current(side, now))
+        self.robot.drive()
+        self._grippers.apply()
+        self.world.step()
+        if self._grippers.drop_lost():
+            self._tell_grasps()
+        news, self._news = self._news, []
+        return news + self._sensing.observe(self.time)
+
+    def truth(self, name: str) -> BodyTruth:
+        """Give a body's true pose and velocity: for scoring only, never for a topic.
+
+        Raises:
+            SimError: no body has this name.
+        """
+        return self.world.truth(name)
+
+    def close(self) -> None:
+        """End the Bullet client; a second call does nothing."""
+        self._client.close()
+
+
+def _known_side(side: str) -> str:
+    if side not in SIDES:
+        raise no_such_side(side)
+    return side
+
+
+def _start_posture(wanted: str | PostureSettings) -> Posture:
+    if isinstance(wanted, str):
+        return posture(wanted)
+    if wanted.right is None:
+        return mirrored(wanted.waist, wanted.left, wanted.torso)
+    return Posture(wanted.waist, wanted.torso, wanted.left, wanted.right)
