@@ -13,7 +13,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["numpy", "pin", "pydantic"],
+    install_requires=["numpy", "pin", "pydantic", "pyyaml"],
     zip_safe=False,
     entry_points={
         "console_scripts": [

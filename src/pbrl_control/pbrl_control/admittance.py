@@ -1,0 +1,107 @@
+"""Force compliance of a grip from its wrist sensor (thesis 6.1; the form is that of Krang's own push program).
+
+Krang moved its gripper at `x_dot = 1.0 (x_ref - x) - F / 750`. Here each axis of the gripper has its own
+numbers: stiff along the push, nearly free across it and about the vertical, because a table with a locked
+caster goes where the caster lets it and the wrist carries 56 N sideways at most.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pbrl_control.kinematics import APPROACH, GRIP, GripperState
+from pbrl_control.planar import Array, cross
+from pbrl_control.settings import ComplianceAxis, ComplianceSettings
+
+
+class WrenchBias:
+    """The wrench a sensor shows while nothing is held: gripper weight and bias, averaged until a grip closes.
+
+    The plates are kept level, so the weight does not change in sensor axes while they turn about the vertical.
+    """
+
+    def __init__(self, time: float) -> None:
+        self._time = time
+        self._mean: Array | None = None
+
+    def update(self, raw: Array, dt: float) -> None:
+        """Take in a sample (6,) while nothing is held; samples that are not finite are left out."""
+        if not np.isfinite(raw).all():
+            return
+        if self._mean is None:
+            self._mean = np.array(raw, dtype=float)
+        else:
+            self._mean += (1.0 - math.exp(-dt / self._time)) * (raw - self._mean)
+
+    def remove(self, raw: Array) -> Array:
+        """Return the wrench (6,) that the held object exerts on the gripper; zeros where the sample is not finite."""
+        if not np.isfinite(raw).all():
+            return np.zeros(6)
+        return np.array(raw) if self._mean is None else raw - self._mean
+
+
+def grip_wrench(side: str, gripper: GripperState, wrench: Array) -> Array:
+    """Return (f_along, f_left, tau_up, f_up) at the middle of the plates, in the gripper's planar axes [N, N m].
+
+    Args:
+        side: "left" or "right".
+        gripper: where it is.
+        wrench: (6,) force then torque at `<side>_ft`, in its axes, bias removed.
+    """
+    rotation = gripper.pose.rotation
+    lever = rotation @ APPROACH[side] * GRIP
+    force = rotation @ wrench[:3]
+    torque = rotation @ wrench[3:] - cross(lever, force)
+    c, s = math.cos(gripper.planar[2]), math.sin(gripper.planar[2])
+    return np.array([c * force[0] + s * force[1], c * force[1] - s * force[0], torque[2], force[2]])
+
+
+class AxisCompliance:
+    """One axis: gives way to a force, comes back to its home."""
+
+    def __init__(self, settings: ComplianceAxis) -> None:
+        self._settings = settings
+        self._slow = 0.0
+
+    def step(self, force: float, displacement: float, dt: float) -> float:
+        """Return the velocity [m/s or rad/s] that yields to the force the object exerts on the gripper.
+
+        Args:
+            force: [N or N m].
+            displacement: from the home of the grip [m or rad].
+            dt: time since the last step [s].
+        """
+        settings = self._settings
+        felt = math.copysign(max(abs(force) - settings.dead_band, 0.0), force)
+        fast = felt / settings.damping
+        if settings.yielding is not None:
+            self._slow += dt * (fast / settings.yielding - self._slow / settings.leak)
+        return fast + self._slow - settings.centring * displacement
+
+
+class Admittance:
+    """Compliance of one grip in its planar axes, from the moment it closed."""
+
+    def __init__(self, settings: ComplianceSettings, home: Array, height: float) -> None:
+        self.home = home
+        self.height = height
+        self._settings = settings
+        axes = (settings.longitudinal, settings.lateral, settings.yaw, settings.vertical)
+        self._axes = tuple(AxisCompliance(axis) for axis in axes)
+
+    def step(self, wrench: Array, displacement: Array, dt: float) -> tuple[Array, float]:
+        """Return the planar twist (3,) in gripper axes and the vertical velocity that compliance adds.
+
+        Args:
+            wrench: (4,) as of `grip_wrench`.
+            displacement: (3,) of the gripper from its home, in its own axes [m, rad].
+            dt: time since the last step [s].
+        """
+        away = np.append(displacement, 0.0)
+        pairs = zip(self._axes, wrench, away, strict=True)
+        raw = np.array([axis.step(float(force), float(way), dt) for axis, force, way in pairs])
+        speed, rate = self._settings.speed, self._settings.yaw_rate
+        limited = np.clip(raw, [-speed, -speed, -rate, -speed], [speed, speed, rate, speed])
+        return limited[:3], float(limited[3])

@@ -1,0 +1,61 @@
+"""Executive and controller as one pure loop: percept in, commands out. For whoever drives a simulator in process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pbrl_control.controller import BodyController
+from pbrl_control.errors import ControlError
+from pbrl_control.kinematics import RobotKinematics
+from pbrl_control.percept import Percept, holds_of
+from pbrl_control.push import GripperAnswer, PushCommand, PushExecutive
+from pbrl_control.push_plan import PushPlan
+from pbrl_control.settings import ControllerSettings
+from pbrl_control.types import BodyCommand, BodyState
+
+
+@dataclass(frozen=True)
+class LoopCommand:
+    """What to send at this moment.
+
+    Attributes:
+        body: velocities of base and arms (waist and torso stand still).
+        push: the executive's command: phase, status, twists, and the requests to carry out now; each is to
+            be answered with `ControlLoop.answer`.
+    """
+
+    body: BodyCommand
+    push: PushCommand
+
+
+class ControlLoop:
+    """One push, from the first percept to done or failed.
+
+    Args:
+        kinematics: of the robot.
+        plan: the push.
+        settings: of the body controller.
+    """
+
+    def __init__(self, kinematics: RobotKinematics, plan: PushPlan, settings: ControllerSettings | None = None) -> None:
+        self.controller = BodyController(kinematics, settings or ControllerSettings())
+        self.executive = PushExecutive(plan)
+        self._last: float | None = None
+
+    def tick(self, now: float, percept: Percept) -> LoopCommand:
+        """Return the commands for the time from `now` [s] on; call it at 100 Hz of the clock that `now` is of."""
+        dt = 0.01 if self._last is None else now - self._last
+        self._last = now
+        push = self.executive.tick(now, percept)
+        if percept.posture is None:
+            return LoopCommand(BodyCommand(report="joint positions: expected some, none have been seen yet"), push)
+        try:
+            holds = holds_of(percept)
+        except ControlError as error:
+            return LoopCommand(BodyCommand(report=str(error)), push)
+        body = self.controller.tick(BodyState(percept.posture), push.twists, holds, percept.wrenches, dt)
+        return LoopCommand(body, push)
+
+    def answer(self, answer: GripperAnswer) -> None:
+        """Pass on what came of a request."""
+        self.executive.answer(answer)

@@ -1,0 +1,177 @@
+"""Node around `BodyController`: /object_twist_command in, /cmd_vel and arm velocities out.
+
+It ticks with every /joint_states message, so at that topic's rate and on its clock, simulated or not. When
+joint states cease nothing is sent any more, and base and arms stop by their own watchdogs.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from pathlib import Path
+
+import rclpy
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, WrenchStamped
+from pbrl_msgs.msg import Grasps, Scene
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, String
+
+from pbrl_bag.ros.stopping import init_until_signal, spin_until
+from pbrl_control.controller import BodyController
+from pbrl_control.errors import ControlError
+from pbrl_control.kinematics import SIDES, RobotKinematics
+from pbrl_control.percept import Grip, Percept, Tag, gripper_tag, holds_of
+from pbrl_control.planar import Array
+from pbrl_control.ros.conversions import (
+    arm_to_msg,
+    base_to_msg,
+    grips_from_msg,
+    posture_from_msg,
+    seconds,
+    tag_from_msg,
+    twist_from_msg,
+    wrench_from_msg,
+)
+from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
+from pbrl_control.settings import ControllerSettings, load_section
+from pbrl_control.types import BodyCommand, BodyState
+from pbrl_control.watchdog import Watchdog
+
+
+class BodyControllerNode(Node):
+    """Whole-body control of what the grippers hold."""
+
+    def __init__(self) -> None:
+        super().__init__("body_controller_node")
+        described = ParameterDescriptor(
+            description="YAML of gains and limits; empty: body_controller.yaml as installed"
+        )
+        path = self.declare_parameter("settings", "", described).value
+        self._settings = load_section(Path(path) if path else _installed_settings(), ControllerSettings, "settings")
+        self._controller: BodyController | None = None
+        self._watchdog = Watchdog(self._settings.timeout)
+        self._wrenches: dict[str, Array] = {}
+        self._grips: dict[str, Grip] = {}
+        self._tags: dict[str, Tag] = {}
+        self._tag_topics: set[str] = set()
+        self._last: float | None = None
+        self._moving = False
+        self._report = ""
+        self._create_publishers()
+        self._create_subscriptions()
+
+    def _create_publishers(self) -> None:
+        self._base = self.create_publisher(Twist, "/cmd_vel", COMMANDS)
+        self._arms = {
+            side: self.create_publisher(Float64MultiArray, f"/{side}_arm_velocity_controller/commands", COMMANDS)
+            for side in SIDES
+        }
+        self._status = self.create_publisher(String, "/body_controller/status", LATCHED)
+
+    def _create_subscriptions(self) -> None:
+        self.create_subscription(String, "/robot_description", self._on_description, LATCHED)
+        self.create_subscription(JointState, "/joint_states", self._on_joints, NEWEST)
+        self.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
+        self.create_subscription(Grasps, "/grasps", self._on_grasps, LATCHED)
+        self.create_subscription(TwistStamped, "/object_twist_command", self._on_twist, COMMANDS)
+        for side in SIDES:
+            self.create_subscription(WrenchStamped, f"/wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
+            self._listen_to_tag(gripper_tag(side))
+
+    def _listen_to_tag(self, name: str) -> None:
+        if name not in self._tag_topics:
+            self._tag_topics.add(name)
+            self.create_subscription(PoseStamped, f"/ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
+
+    def _on_description(self, message: String) -> None:
+        try:
+            self._controller = BodyController(RobotKinematics(message.data), self._settings)
+        except ControlError as error:
+            self._controller = None
+            self.get_logger().error(str(error))
+
+    def _on_scene(self, message: Scene) -> None:
+        for body in message.bodies:
+            if body.movable:
+                self._listen_to_tag(body.name)
+
+    def _on_grasps(self, message: Grasps) -> None:
+        self._grips = grips_from_msg(message)
+
+    def _on_twist(self, message: TwistStamped) -> None:
+        target, twist = twist_from_msg(message)
+        self._watchdog.feed(self._now(), target, twist)
+
+    def _on_wrench(self, side: str, message: WrenchStamped) -> None:
+        self._wrenches[side] = wrench_from_msg(message)
+
+    def _on_tag(self, name: str, message: PoseStamped) -> None:
+        self._tags[name] = tag_from_msg(message)
+
+    def _on_joints(self, message: JointState) -> None:
+        stamp = seconds(message.header.stamp)
+        dt, self._last = stamp - (stamp if self._last is None else self._last), stamp
+        if self._controller is not None and dt > 0.0:
+            self._send(self._tick(self._controller, message, min(dt, 0.1)))
+
+    def _tick(self, controller: BodyController, message: JointState, dt: float) -> BodyCommand | None:
+        """Return what to send; None where nobody commands anything."""
+        try:
+            twists = self._watchdog.current(self._now())
+            posture = posture_from_msg(message)
+            holds = holds_of(Percept(posture, self._tags, self._wrenches, self._grips))
+            command = controller.tick(BodyState(posture), twists, holds, self._wrenches, dt)
+        except ControlError as error:
+            return BodyCommand(report=str(error))
+        return command if twists or command.report else None
+
+    def _send(self, command: BodyCommand | None) -> None:
+        """Publish a command; when commands cease, one that stops everything, and then leave the drives alone."""
+        if command is None and not self._moving:
+            return
+        self._moving = command is not None
+        command = command or BodyCommand()
+        self._base.publish(base_to_msg(command.base_v, command.base_w))
+        for side in SIDES:
+            self._arms[side].publish(arm_to_msg(command.arm(side)))
+        if command.report != self._report:
+            self._report = command.report
+            self._status.publish(String(data=command.report or "ok"))
+            if command.report:
+                self.get_logger().warning(command.report)
+
+    def _now(self) -> float:
+        return self.get_clock().now().nanoseconds * 1e-9
+
+
+def _installed_settings() -> Path:
+    try:
+        return Path(get_package_share_directory("pbrl_config")) / "params" / "body_controller.yaml"
+    except PackageNotFoundError as error:
+        raise ControlError("settings: expected package pbrl_config to be installed; run ./pbrl once") from error
+
+
+def main() -> None:
+    """Run the node until it is told to stop."""
+    stop = init_until_signal()
+    node = None
+    try:
+        node = BodyControllerNode()
+        spin_until(node, stop.is_set)
+    except ControlError as error:
+        print(f"body_controller_node: {error}", file=sys.stderr)
+        sys.exit(2)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,154 @@
+"""Node around `PushExecutive`: runs one push plan; /push/status says where it is."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+
+import rclpy
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from pbrl_msgs.msg import Grasps, Scene
+from pbrl_msgs.srv import GraspObject, ReleaseObject
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rclpy.client import Client
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.task import Future
+from std_msgs.msg import String
+
+from pbrl_bag.ros.stopping import init_until_signal, spin_until
+from pbrl_control.errors import ControlError
+from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag
+from pbrl_control.planar import Array
+from pbrl_control.push import GripperAnswer, GripperRequest, Phase, PushCommand, PushExecutive
+from pbrl_control.push_plan import load_plan
+from pbrl_control.ros.conversions import bodies_from_msg, grips_from_msg, tag_from_msg, twist_to_msg, wrench_from_msg
+from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
+
+
+class PushNode(Node):
+    """Drives up to an object, grasps, pushes and releases it, as a plan says.
+
+    Attributes:
+        ended: completes with the last command when the push has ended and `exit_when_done` is set.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("push_node")
+        plan = self._parameter("plan", "turn_table", "name of a plan in config/params/pushes, or a path")
+        self._exit = self._parameter("exit_when_done", False, "end with exit code 0 when done, 1 when failed")
+        span = FloatingPointRange(from_value=10.0, to_value=200.0)
+        rate = self._parameter("rate", 50.0, "ticks a second, on the node's clock [Hz]", [span])
+        self._executive = PushExecutive(load_plan(str(plan)))
+        self.ended: Future = Future()
+        self._tags: dict[str, Tag] = {}
+        self._wrenches: dict[str, Array] = {}
+        self._grips: dict[str, Grip] = {}
+        self._bodies: dict[str, BodyShape] = {}
+        self._phase = ""
+        self._subscribe()
+        self._status = self.create_publisher(String, "/push/status", LATCHED)
+        self._twist = self.create_publisher(TwistStamped, "/object_twist_command", COMMANDS)
+        self._callers: dict[str, Client] = {
+            "grasp": self.create_client(GraspObject, "/grasp"),
+            "release": self.create_client(ReleaseObject, "/release"),
+        }
+        self.create_timer(1.0 / float(rate), self._tick)
+
+    def _parameter(self, name: str, default: object, description: str, span: list[FloatingPointRange] | None = None):
+        described = ParameterDescriptor(description=description, floating_point_range=span or [])
+        return self.declare_parameter(name, default, described).value
+
+    def _subscribe(self) -> None:
+        plan = self._executive.plan
+        self.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
+        self.create_subscription(Grasps, "/grasps", self._on_grasps, LATCHED)
+        for side in (grip.gripper for grip in plan.grips):
+            self.create_subscription(WrenchStamped, f"/wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
+        for name in (plan.object, *(gripper_tag(grip.gripper) for grip in plan.grips)):
+            self.create_subscription(PoseStamped, f"/ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
+
+    def _on_scene(self, message: Scene) -> None:
+        self._bodies = bodies_from_msg(message)
+
+    def _on_grasps(self, message: Grasps) -> None:
+        self._grips = grips_from_msg(message)
+
+    def _on_wrench(self, side: str, message: WrenchStamped) -> None:
+        self._wrenches[side] = wrench_from_msg(message)
+
+    def _on_tag(self, name: str, message: PoseStamped) -> None:
+        self._tags[name] = tag_from_msg(message)
+
+    def _tick(self) -> None:
+        now = self.get_clock().now()
+        percept = Percept(None, self._tags, self._wrenches, self._grips, self._bodies)
+        command = self._executive.tick(now.nanoseconds * 1e-9, percept)
+        for target, twist in command.twists.items():
+            self._twist.publish(twist_to_msg(target, twist, now.to_msg()))
+        for request in command.requests:
+            self._ask(request)
+        self._tell(command)
+
+    def _tell(self, command: PushCommand) -> None:
+        if command.phase == self._phase:
+            return
+        self._phase = command.phase
+        failed = command.phase == Phase.FAILED
+        self._status.publish(String(data=f"failed: {command.status}" if failed else str(command.phase)))
+        if failed:  # rclpy remembers a severity for each line of code
+            self.get_logger().error(f"failed: {command.status}")
+        else:
+            self.get_logger().info(f"{command.phase}: {command.status}")
+        if command.finished and self._exit and not self.ended.done():
+            self.ended.set_result(command)
+
+    def _ask(self, request: GripperRequest) -> None:
+        client = self._callers[request.action]
+        if not client.service_is_ready():
+            sentence = f"no service {client.srv_name}; is the simulator or robot running?"
+            self._executive.answer(GripperAnswer(request.action, request.side, False, sentence))
+            return
+        if request.action == "grasp":
+            call = client.call_async(GraspObject.Request(gripper=request.side, object=request.object))
+        else:
+            call = client.call_async(ReleaseObject.Request(gripper=request.side))
+        call.add_done_callback(partial(self._on_answer, request))
+
+    def _on_answer(self, request: GripperRequest, call: Future) -> None:
+        result = call.result()
+        if result is None:
+            sentence = f"the {request.action} service gave no result"
+            self._executive.answer(GripperAnswer(request.action, request.side, False, sentence))
+            return
+        distance = float(getattr(result, "distance", 0.0))
+        answer = GripperAnswer(request.action, request.side, bool(result.success), str(result.message), distance)
+        self._executive.answer(answer)
+
+
+def main() -> None:
+    """Run the node; with `exit_when_done`, end with 0 when the push is done and 1 when it failed."""
+    stop = init_until_signal()
+    node, code = None, 0
+    try:
+        node = PushNode()
+        spin_until(node, lambda: stop.is_set() or node.ended.done())
+        if node.ended.done():
+            command = node.ended.result()
+            code = int(command.phase == Phase.FAILED)
+            if code:
+                print(f"push_node: {command.status}", file=sys.stderr)
+    except ControlError as error:
+        print(f"push_node: {error}", file=sys.stderr)
+        code = 2
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()
