@@ -98,7 +98,7 @@ def require_tools(ros: bool) -> None:
 
 def install_requirements(root: Path, venv: Path, *, wheels: bool) -> None:
     """Install the exact pins into `venv`."""
-    files = ["base.txt", "build.txt", *(["ros-wheels.txt"] if wheels else [])]
+    files = ["base.txt", "build.txt", "ros-wheels.txt" if wheels else "ros-sourced.txt"]
     arguments = [part for name in files for part in ("-r", str(root / "requirements" / name))]
     # The constraints were resolved with Python 3.11; a sourced ROS brings its own Python and packages.
     constraints = ["-c", str(root / "requirements/constraints.txt")] if wheels else []
@@ -128,7 +128,6 @@ def build_environment(venv: Path, ros: str | None) -> dict[str, str]:
     env = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "PYTHONHOME")}
     env["VIRTUAL_ENV"] = str(venv)
     env["PATH"] = f"{venv / 'bin'}:{env['PATH']}"
-    env["NUMBA_CACHE_DIR"] = str(venv / "cache/numba")
     if ros:
         env["PYTHONPATH"] = os.environ.get("PYTHONPATH", "")
         return env
@@ -137,7 +136,6 @@ def build_environment(venv: Path, ros: str | None) -> dict[str, str]:
     env["LD_LIBRARY_PATH"] = ":".join([*map(str, libraries), *([inherited] if inherited else [])])
     env["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] = "1"  # spares every Python a second start
     env["AMENT_PREFIX_PATH"] = env["CMAKE_PREFIX_PATH"] = str(venv)
-    env["ROS_DISTRO"] = "jazzy"
     return env
 
 
@@ -152,7 +150,8 @@ def build_underlay(root: Path, env: dict[str, str]) -> Path | None:
     if not all((base / "install" / index / name).exists() for name in missing):
         for name in missing:
             write_interface_package(base / "src" / name, name)
-        colcon(base, base, env, None)
+        (base / "COLCON_IGNORE").touch()  # a plain `colcon build` in the root is to leave it alone
+        colcon(root, base, env, None)
     return base / "install"
 
 
@@ -179,18 +178,17 @@ def write_interface_package(folder: Path, name: str) -> None:
     )
 
 
-def colcon(folder: Path, root: Path, env: dict[str, str], underlay: Path | None) -> None:
+def colcon(root: Path, folder: Path, env: dict[str, str], underlay: Path | None) -> None:
     """Build the packages below `folder` into `folder/install`, on top of the environment."""
     if underlay:
         env = sourced(env, underlay)
-    only = [] if underlay is None and folder.name == "underlay" else ["msg", "urdf", "config", "src"]
-    paths = ["--base-paths", *(only or ["src"])]
+    paths = ["--base-paths", *(["msg", "urdf", "config", "src"] if folder == root else ["src"])]
     layout = ["--merge-install", "--symlink-install"]
     command = ["python", "-m", "colcon", "--log-level", "error", "build", *layout, *paths]
     command += ["--event-handlers", "console_direct-", "console_cohesion-", "summary-", "status-"]
     # setup.py develop and easy_install are deprecated and say so; colcon still builds links with them.
     command += ["--cmake-args", "-DBUILD_TESTING=OFF", f"-DPython3_EXECUTABLE={env['VIRTUAL_ENV']}/bin/python"]
-    run(command, folder, env | {"PYTHONWARNINGS": "ignore"}, log=root / "log/latest_build")
+    run(command, folder, env | {"PYTHONWARNINGS": "ignore"}, log=folder / "log/latest_build")
 
 
 def sourced(env: dict[str, str], prefix: Path) -> dict[str, str]:
@@ -205,7 +203,7 @@ def write_environment(root: Path, env: dict[str, str], underlay: Path | None) ->
     if underlay:
         env = sourced(env, underlay)
     env = sourced(env, root / "install")
-    names = [*ENVIRONMENT, "NUMBA_CACHE_DIR", "VIRTUAL_ENV", "ROS_DISTRO", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"]
+    names = [*ENVIRONMENT, "VIRTUAL_ENV", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"]
     original = os.environ.get("PATH", "")
     lines = []
     for name in names:
