@@ -13,7 +13,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["numpy", "scipy", "numba", "pymunk", "shapely", "arviz", "pydantic"],
+    install_requires=["numpy", "scipy", "numba", "pymunk", "shapely", "arviz", "pydantic", "pyyaml", "h5netcdf"],
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -1,0 +1,110 @@
+"""Posteriors to and from ArviZ, and to and from files (netCDF, which other tools read; no pickle)."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbrl_model.arviz_import import az
+from pbrl_model.errors import ModelError
+from pbrl_model.parameters import KERNEL_COLUMNS, UNITS, BodyParameters
+from pbrl_model.posterior import Posterior
+
+FORMAT = "pbrl_model/posterior/1"
+
+
+def to_inference_data(posterior: Posterior) -> Any:
+    """Return the posterior as ArviZ `InferenceData`: one variable a parameter, with its unit, over (chain, draw)."""
+    data = az().from_dict(posterior={name: np.array(posterior.column(name)) for name in posterior.names})
+    group = data["posterior"]
+    for name in posterior.names:
+        group[name].attrs["units"] = UNITS[name]
+    group.attrs.update(
+        {
+            "format": FORMAT,
+            "object": posterior.object,
+            "model_class": posterior.model_class,
+            "names": json.dumps(posterior.names),
+            "base": json.dumps({name: _number(value) for name, value in asdict(posterior.base).items()}),
+            "log_evidence": posterior.log_evidence,
+            "heldout_rmse": posterior.heldout_rmse,
+        }
+    )
+    return data
+
+
+def from_inference_data(data: Any) -> Posterior:
+    """Return the posterior that `to_inference_data` wrote.
+
+    Raises:
+        ModelError: something is missing or of another form.
+    """
+    try:
+        group = data["posterior"]
+        attributes = group.attrs
+        if attributes["format"] != FORMAT:
+            raise ModelError(f"posterior: expected format {FORMAT}, got {attributes['format']!r}")
+        names = tuple(json.loads(attributes["names"]))
+        for name in names:
+            if group[name].attrs["units"] != UNITS[name]:
+                raise ModelError(f"posterior: expected {name} in {UNITS[name]}, got {group[name].attrs['units']}")
+        base = {name: _value(json.loads(attributes["base"])[name]) for name in KERNEL_COLUMNS}
+        return Posterior(
+            object=str(attributes["object"]),
+            model_class=str(attributes["model_class"]),
+            names=names,
+            draws=np.stack([group[name].values for name in names], axis=-1),
+            base=BodyParameters(**base),
+            log_evidence=float(attributes["log_evidence"]),
+            heldout_rmse=float(attributes["heldout_rmse"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        what = " ".join(str(error).split())
+        raise ModelError(f"posterior: expected what save_posterior writes, got something else ({what})") from None
+
+
+def save_posterior(posterior: Posterior, path: Path) -> None:
+    """Write the posterior as netCDF; the file is there whole or not at all.
+
+    Raises:
+        ModelError: it cannot be written.
+    """
+    unfinished = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        to_inference_data(posterior).to_netcdf(str(unfinished))
+        unfinished.replace(path)
+    except OSError as error:
+        raise ModelError(f"{path}: expected to write a posterior there, got {' '.join(str(error).split())}") from None
+
+
+def load_posterior(path: Path) -> Posterior:
+    """Read what `save_posterior` wrote.
+
+    Raises:
+        ModelError: the file is missing, cut off or of another form.
+    """
+    if not path.is_file():
+        raise ModelError(f"{path}: expected a posterior's file, got none")
+    try:
+        data = az().from_netcdf(str(path))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ModelError(f"{path}: expected netCDF, got {' '.join(str(error).split())}") from None
+    try:
+        return from_inference_data(data)
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
+
+
+def _number(value: float) -> float | None:
+    """NaN as JSON has it."""
+    return None if math.isnan(value) else value
+
+
+def _value(number: Any) -> float:
+    return math.nan if number is None else float(number)

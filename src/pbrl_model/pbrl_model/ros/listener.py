@@ -1,0 +1,113 @@
+"""Hears the topics of a recording, from whoever publishes them, and keeps the bytes until they are asked for."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from functools import partial
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
+from rclpy.subscription import Subscription
+
+from pbrl_bag.builder import RecordingBuilder
+from pbrl_bag.errors import BagError
+from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
+from pbrl_bag.types import Recording
+
+DISCOVERY_SECONDS = 0.1
+
+
+class RecordingListener(Node):
+    """Subscribes to every topic that plays a role in a recording, as soon as somebody publishes it.
+
+    A node of its own with an executor of its own in a thread, so that a fit in the other node's callback does not
+    make it deaf. Messages are kept as bytes: some 60 kB for a second of a robot with two wrists.
+
+    Args:
+        name: of the node.
+        context: the one to join; None: the default one.
+    """
+
+    def __init__(self, name: str, context: Context | None = None):
+        super().__init__(name, context=context, start_parameter_services=False, enable_rosout=False)
+        self._builder = RecordingBuilder()
+        self._heard: list[tuple[str, type, bytes]] = []
+        self._last: dict[str, tuple[type, bytes]] = {}
+        self._subscriptions_by_topic: dict[str, tuple[Subscription, QoSProfile]] = {}
+        self._refused: set[str] = set()
+        self.create_timer(DISCOVERY_SECONDS, self.discover, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self)
+        self._thread = threading.Thread(target=self._spin, name=name, daemon=True)
+
+    def start(self) -> None:
+        """Begin to listen, in a thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop listening and leave the graph."""
+        self._executor.shutdown()
+        if self._thread.is_alive():
+            self._thread.join()
+        self.destroy_node()
+
+    def count(self) -> int:
+        """Return how many messages have been heard."""
+        return len(self._heard)
+
+    def last(self, topic: str) -> Any | None:
+        """Return the last message of a topic, or None."""
+        entry = self._last.get(topic)
+        return None if entry is None else deserialize_message(entry[1], entry[0])
+
+    def recording(self) -> Recording:
+        """Return what has been heard so far.
+
+        Raises:
+            BagError: a topic is missing or a stream is malformed.
+        """
+        heard = self._heard[:]  # one bytecode: the listener's thread may append, and does not have to wait
+        builder = RecordingBuilder()
+        for topic, kind, data in heard:
+            builder.add(topic, deserialize_message(data, kind))
+        return builder.build("what was heard")
+
+    def discover(self) -> None:
+        """Subscribe to what is new, and again where a publisher came whom the old request keeps out."""
+        for topic, types in self.get_topic_names_and_types():
+            if topic in self._refused or not self._builder.wants(topic):
+                continue
+            offered = [qos_from_profile(info.qos_profile) for info in self.get_publishers_info_by_topic(topic)]
+            if offered:
+                self._subscribe(topic, types, profile_that_hears(offered))
+
+    def _subscribe(self, topic: str, types: list[str], profile: QoSProfile) -> None:
+        known = self._subscriptions_by_topic.get(topic)
+        if known and (known[1].reliability, known[1].durability) == (profile.reliability, profile.durability):
+            return
+        try:
+            if len(types) != 1:
+                raise BagError(f"expected one type, got {' and '.join(types)}")
+            kind = message_class(types[0])
+        except BagError as error:
+            self._refused.add(topic)
+            self.get_logger().warning(f"{topic} is not heard: {error}")
+            return
+        if known:
+            self.destroy_subscription(known[0])
+        subscription = self.create_subscription(kind, topic, partial(self._keep, topic, kind), profile, raw=True)
+        self._subscriptions_by_topic[topic] = (subscription, profile)
+
+    def _keep(self, topic: str, kind: type, data: bytes) -> None:
+        self._heard.append((topic, kind, data))
+        self._last[topic] = (kind, data)
+
+    def _spin(self) -> None:
+        with contextlib.suppress(ExternalShutdownException):
+            self._executor.spin()

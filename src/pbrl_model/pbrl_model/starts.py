@@ -1,0 +1,111 @@
+"""The mode finder: thousands of draws from the prior in a few kernel calls, the best distinct ones polished.
+
+An open-loop likelihood is a needle: over long windows almost every start is lost. So the search begins with short
+windows, in which every model is nearly right, and grows them as the fit improves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_model.errors import ModelError
+from pbrl_model.guesses import guesses
+from pbrl_model.likelihood import WindowedLikelihood
+from pbrl_model.polish import Modes, polish
+from pbrl_model.sensing import Motion
+from pbrl_model.target import Target
+from pbrl_model.windows import shooting_windows
+
+Array = NDArray[np.float64]
+
+FIRST_NOISE = (np.log(2.0), np.log(4.0))
+"""ln sigma and ln drag while draws are compared: generous, for none of them is right yet."""
+DISTINCT = 0.15
+"""Positions nearer than this share of the prior's spread in every parameter are one."""
+
+
+@dataclass(frozen=True)
+class SearchPlan:
+    """How wide and how long to search.
+
+    Attributes:
+        draws: from the prior.
+        keep: starts kept after each stage.
+        lengths: windows' lengths of the stages before the last [s]; the last stage is the target's own windows.
+        iterations: of the polish in each stage.
+    """
+
+    draws: int = 600
+    keep: tuple[int, ...] = (20, 10, 5)
+    lengths: tuple[float, ...] = (0.5, 1.0)
+    iterations: tuple[int, ...] = (6, 8, 20)
+
+    def __post_init__(self) -> None:
+        if not len(self.keep) == len(self.iterations) == len(self.lengths) + 1:
+            raise ModelError(f"search: expected {len(self.lengths) + 1} stages' `keep` and `iterations`, got {self}")
+
+
+def distinct(position: Array, value: Array, spread: Array, count: int) -> NDArray[np.int64]:
+    """Return the rows of the best positions that differ from one another.
+
+    Args:
+        position: (n, D), learned parameters first.
+        value: (n,) log densities.
+        spread: (K,) scale of each learned parameter.
+        count: at most so many.
+    """
+    kept: list[int] = []
+    for row in np.argsort(-value, kind="stable"):
+        if not np.isfinite(value[row]) or len(kept) == count:
+            break
+        scaled = np.abs(position[kept, : len(spread)] - position[row, : len(spread)]) / spread
+        if not kept or np.all(np.any(scaled > DISTINCT, axis=1)):
+            kept.append(int(row))
+    return np.array(kept, dtype=np.int64)
+
+
+def find_modes(rng: np.random.Generator, target: Target, motions: Sequence[Motion], plan: SearchPlan) -> Modes:
+    """Search the prior's whole support for modes of the target.
+
+    Args:
+        rng: source of randomness.
+        target: log density over its final windows.
+        motions: that the windows were cut from, to cut shorter ones.
+        plan: effort.
+
+    Returns:
+        Distinct modes, best first.
+
+    Raises:
+        ModelError: no draw has a finite density.
+    """
+    names, body = target.names, target.likelihood.body
+    draws = target.prior.sample(rng, plan.draws)
+    spread = np.maximum(draws.std(axis=0), 1e-9)
+    informed = guesses(names, motions, body.com, target.prior.sample(rng, max(plan.draws // 20, 8)))
+    physics = np.concatenate([draws, _inside(target, informed)])
+    position = np.concatenate([physics, np.tile(FIRST_NOISE, (len(physics), 1))], -1)
+    first = True
+    for length, keep, iterations in zip(plan.lengths, plan.keep, plan.iterations, strict=False):
+        windows = shooting_windows(motions, length)
+        stage = target.over(WindowedLikelihood(body, windows, with_drag=target.likelihood.with_drag))
+        if first:
+            rows = distinct(position, stage.full_log_density(position), spread, keep)
+            if len(rows) == 0:
+                raise ModelError("search: expected a draw of the prior with finite density, got none; check the priors")
+            position, first = position[rows], False
+        modes = polish(stage, position, spread, iterations=iterations)
+        position = modes.point.position[distinct(modes.point.position, modes.point.log_density, spread, keep)]
+    modes = polish(target, position[: plan.keep[-1]], spread, iterations=plan.iterations[-1])
+    return modes.take(distinct(modes.point.position, modes.point.log_density, spread, len(position)))
+
+
+def _inside(target: Target, physics: Array) -> Array:
+    """Bring guesses into the prior's support, angles excepted."""
+    lower, upper = target.prior.bounds
+    periodic = target.prior.periodic
+    return np.clip(physics, np.where(periodic, -np.inf, lower), np.where(periodic, np.inf, upper))

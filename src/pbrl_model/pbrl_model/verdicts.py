@@ -1,0 +1,57 @@
+"""What the data do not say: notes that keep a posterior from being read as more than it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pbrl_model.diagnostics import convergence
+from pbrl_model.parameters import ANGLES
+from pbrl_model.posterior import Posterior
+from pbrl_model.priors import Prior
+from pbrl_model.sensing import Motion
+from pbrl_model.symmetry import canonical_wheel
+
+LEARNED_SHARE = 0.6
+"""A posterior wider than this share of its prior has learned nothing worth a number."""
+DISAGREE = 1.1
+"""Split R-hat above which chains tell different things."""
+PRIOR_DRAWS = 2000
+
+
+def notes_on(
+    posterior: Posterior, prior: Prior, motions: Sequence[Motion], rng: np.random.Generator
+) -> tuple[str, ...]:
+    """Return sentences on what this posterior must not be asked.
+
+    Args:
+        posterior: of one object.
+        prior: over the same parameters, tied ones left out.
+        motions: the episodes it was learned from.
+        rng: draws from the prior to compare with.
+    """
+    notes = []
+    moved = max(float(np.ptp(motion.state[:, :2], axis=0).max()) for motion in motions)
+    turned = max(float(np.ptp(motion.state[:, 2])) for motion in motions)
+    noise = max(float(motion.noise[:2].max()) for motion in motions)
+    if moved < 3.0 * noise and turned < 0.02:
+        notes.append(f"the data do not say how {posterior.object} moves: it moved less than {max(moved, 1e-3):.3f} m")
+    draws = canonical_wheel(prior.sample(rng, PRIOR_DRAWS), prior.names)
+    after = dict(zip(posterior.names, posterior.sd(), strict=True))
+    vague = [
+        name
+        for name, before in zip(prior.names, draws.std(axis=0), strict=True)
+        if name not in ANGLES and after[name] > LEARNED_SHARE * before
+    ]
+    if vague:
+        notes.append(f"the data do not say {', '.join(vague)}: as wide after the fit as before")
+    if len(posterior.draws) > 1:
+        apart = [
+            name
+            for name, found in convergence(posterior).items()
+            if name not in ANGLES and name not in vague and found.rhat > DISAGREE
+        ]
+        if apart:
+            notes.append(f"the chains do not agree on {', '.join(apart)}: several explanations remain, or run longer")
+    return tuple(notes)

@@ -1,0 +1,103 @@
+"""The listener: hears a recording's topics as they appear, whatever their quality of service."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+import rclpy
+from geometry_msgs.msg import Point, PoseStamped, WrenchStamped
+from pbrl_msgs.msg import Body, Grasp, Grasps, Scene
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from pbrl_bag.errors import BagError
+from pbrl_model.ros.listener import RecordingListener
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+SENSOR = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+PATIENCE = 20.0  # [s]
+
+
+@pytest.fixture
+def context(monkeypatch: pytest.MonkeyPatch) -> Iterator[Context]:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    context = Context()
+    rclpy.init(context=context, domain_id=1 + os.getpid() % 200)
+    yield context
+    rclpy.try_shutdown(context=context)
+
+
+def until(node: Node, condition: Callable[[], bool]) -> None:
+    """Let a node work until a condition holds."""
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, "did not happen"
+        executor.spin_once(timeout_sec=0.005)
+    executor.remove_node(node)
+
+
+def stamped(message: PoseStamped | WrenchStamped, seconds: float, frame: str) -> PoseStamped | WrenchStamped:
+    message.header.stamp.sec, message.header.stamp.nanosec = int(seconds), round((seconds % 1) * 1e9)
+    message.header.frame_id = frame
+    return message
+
+
+def scene() -> Scene:
+    outline = [Point(x=x, y=y) for x, y in ((-0.5, -0.3), (0.5, -0.3), (0.5, 0.3), (-0.5, 0.3))]
+    message = Scene(bodies=[Body(name="table", footprint=outline, height=0.7, nominal_mass=20.0, movable=True)])
+    message.header.frame_id = "world"
+    return message
+
+
+def held(names: list[str], seconds: float) -> Grasps:
+    message = Grasps(grasps=[Grasp(gripper="left", object=name, contact_point=Point(x=-0.5)) for name in names])
+    message.header.stamp.sec = int(seconds)
+    return message
+
+
+def test_hears_what_makes_a_recording(context: Context) -> None:
+    listener = RecordingListener("listener", context)
+    listener.start()
+    robot = Node("robot", context=context)
+    latched = [robot.create_publisher(kind, topic, LATCHED) for kind, topic in ((Scene, "/scene"), (Grasps, "/grasps"))]
+    latched[0].publish(scene())
+    latched[1].publish(held([], 0.0))
+    streams = {
+        "/wrist_ft/left": robot.create_publisher(WrenchStamped, "/wrist_ft/left", SENSOR),
+        "/ar_tags/table/pose": robot.create_publisher(PoseStamped, "/ar_tags/table/pose", 200),
+        "/ar_tags/left_gripper/pose": robot.create_publisher(PoseStamped, "/ar_tags/left_gripper/pose", 200),
+    }
+    until(robot, lambda: all(stream.get_subscription_count() for stream in streams.values()) and listener.count() >= 2)
+    latched[1].publish(held(["table"], 1.0))
+    for k in range(100):
+        wrench = stamped(WrenchStamped(), k * 0.05, "left_ft")
+        pose = stamped(PoseStamped(), k * 0.05, "world")
+        pose.pose.position.x, pose.pose.orientation.w = k * 1e-3, 1.0
+        streams["/wrist_ft/left"].publish(wrench)
+        streams["/ar_tags/table/pose"].publish(pose)
+        streams["/ar_tags/left_gripper/pose"].publish(pose)
+        heard = 3 + 3 * (k + 1)
+        until(robot, lambda heard=heard: listener.count() >= heard)
+    recording = listener.recording()
+    assert set(recording.bodies) == {"table"} and set(recording.wrenches) == {"left"}
+    np.testing.assert_allclose(recording.object_poses["table"].position[:, 0], np.arange(100) * 1e-3)
+    assert [(grasp.object, grasp.start) for grasp in recording.grasps] == [("table", 1.0)]
+    assert listener.last("/ar_tags/table/pose").pose.position.x == pytest.approx(0.099)
+    assert listener.last("/ar_tags/chair/pose") is None
+    robot.destroy_node()
+    listener.stop()
+
+
+def test_nothing_heard_is_an_error_that_says_so(context: Context) -> None:
+    listener = RecordingListener("listener", context)
+    with pytest.raises(BagError, match="got no message"):
+        listener.recording()
+    listener.stop()
