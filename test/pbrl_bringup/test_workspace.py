@@ -28,7 +28,7 @@ def test_sourced_jazzy_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_another_distribution_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DISTRO", "humble")
-    with pytest.raises(workspace.SetupError, match="jazzy.*got 'humble'"):
+    with pytest.raises(workspace.SetupError, match=r"jazzy.*got 'humble'"):
         workspace.sourced_ros()
 
 

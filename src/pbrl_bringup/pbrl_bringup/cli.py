@@ -1,5 +1,216 @@
-"""The command line."""
+"""The command line: it parses, hands over to `pbrl_bringup.commands`, and turns mistakes into one line.
+
+Exit codes: 0 done; 1 a fault of ours, or tests that fail; 2 something the person can mend; 130 Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Sequence
+from enum import StrEnum
+from importlib import import_module
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Any
+
+import typer
+from typer.exceptions import TyperException
+
+# Errors whose message is for the person at the keyboard. Named, not imported: an error can only have
+# been raised by a module that is loaded, and loading all of them would slow every start.
+USER_ERRORS = {
+    "pbrl_bag.errors": "BagError",
+    "pbrl_model.errors": "ModelError",
+    "pbrl_control.errors": "ControlError",
+    "bullet_sim.errors": "SimError",
+    "pbrl_bringup.errors": "BringupError",
+}
+
+app = typer.Typer(
+    name="pbrl",
+    help="A robot pushes things whose physics it does not know, and learns a model of each from the recording.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+class Likelihood(StrEnum):
+    """Windowed multiple shooting, or one of its limits in the thesis: (25) and (39)."""
+
+    WINDOWED = "windowed"
+    ONE_STEP = "one_step"
+    INTEGRATED = "integrated"
+
+
+Seed = Annotated[int, typer.Option(min=0, help="Seed of every random draw; the same seed gives the same result.")]
+Out = Annotated[Path, typer.Option(help="Folder for the results.")]
+Bag = Annotated[Path, typer.Argument(help="Bag folder, .mcap file, or .csv with --map.")]
+Mapping = Annotated[
+    Path | None, typer.Option("--map", help="Which topic or column plays which role in a foreign file.")
+]
+Domain = Annotated[int | None, typer.Option(min=0, max=101, help="ROS_DOMAIN_ID; by default the environment's own.")]
+Many = {"allow_extra_args": True, "ignore_unknown_options": True}
+
+
+def _hand_over(command: str, **arguments: Any) -> int:
+    """Run `pbrl_bringup.commands.<command>.command`, imported only now: what it needs may be heavy."""
+    return int(import_module(f"pbrl_bringup.commands.{command}").command(**arguments))
+
+
+@app.command(epilog="Example: ./pbrl demo --seed 3 --out out/demo")
+def demo(
+    out: Out = Path("out/demo"),
+    seed: Seed = 0,
+    gui: Annotated[
+        bool | None, typer.Option("--gui/--headless", help="Bullet's window, or none. Default: none without a display.")
+    ] = None,
+) -> int:
+    """Push a table with a locked caster, learn from the recording, show it on a page."""
+    return _hand_over("demo", out=out, seed=seed, gui=gui)
+
+
+@app.command(context_settings=Many, epilog="Example: ./pbrl test -- -k kernel -x")
+def test(context: typer.Context) -> int:
+    """Check style and types, then run every test; further arguments go to pytest."""
+    return _hand_over("test", arguments=context.args)
+
+
+@app.command(epilog="Example: ./pbrl fit out/demo/bag --out out/fit")
+def fit(
+    bag: Bag,
+    mapping: Mapping = None,
+    out: Out = Path("out/fit"),
+    model_class: Annotated[
+        str, typer.Option(help="free, wheel, hinge; auto: hinge where only a point of the body was seen, else wheel.")
+    ] = "auto",
+    likelihood: Annotated[Likelihood, typer.Option(help="How motion is compared.")] = Likelihood.WINDOWED,
+    draws: Annotated[
+        int | None, typer.Option(min=10, help="Posterior draws to keep from each chain. Default: the model's.")
+    ] = None,
+    seed: Seed = 0,
+) -> int:
+    """Learn the physics of every object that was pushed in a recording."""
+    return _hand_over(
+        "fit",
+        bag=bag,
+        mapping=mapping,
+        out=out,
+        model_class=model_class,
+        likelihood=str(likelihood),
+        draws=draws,
+        seed=seed,
+    )
+
+
+@app.command(epilog="Example: ./pbrl simulate locked_caster --push turn_table --seed 2 --out out/push")
+def simulate(
+    scene: Annotated[str, typer.Argument(help="Scene file, or a name in config/scenes.")],
+    out: Annotated[Path, typer.Option(help="Bag folder to make; it must not exist yet.")],
+    push: Annotated[str, typer.Option(help="Push plan, or a name in config/params/pushes.")] = "turn_table",
+    seed: Seed = 0,
+    gui: Annotated[bool, typer.Option("--gui", help="Open Bullet's window.")] = False,
+) -> int:
+    """Simulate a push and record it, faster than real time, without ROS processes."""
+    return _hand_over("simulate", scene=scene, push=push, seed=seed, out=out, gui=gui)
+
+
+@app.command(epilog="Example: ./pbrl run krang_push --set sim.scene=three_tables --with recorder")
+def run(
+    graph: Annotated[str, typer.Argument(help="Graph file, or a name in config/params/graphs.")],
+    set_: Annotated[list[str] | None, typer.Option("--set", help="NODE.PARAMETER=VALUE, as often as needed.")] = None,
+    with_: Annotated[list[str] | None, typer.Option("--with", help="An optional node to start too.")] = None,
+    domain: Domain = None,
+    logs: Annotated[Path, typer.Option(help="Folder for the nodes' output.")] = Path("out/logs"),
+) -> int:
+    """Start a graph of nodes and keep it until Ctrl-C."""
+    return _hand_over("run", graph=graph, settings=set_ or [], optional=with_ or [], domain=domain, logs=logs)
+
+
+@app.command(epilog="Example: ./pbrl record --out out/push.bag")
+def record(
+    out: Annotated[Path, typer.Option(help="Bag folder to make; it must not exist yet.")],
+    duration: Annotated[float, typer.Option(min=0, help="Seconds to record; 0: until Ctrl-C.")] = 0.0,
+    domain: Domain = None,
+) -> int:
+    """Record the contract's topics of a running graph or robot."""
+    return _hand_over("record", out=out, duration=duration, domain=domain)
+
+
+@app.command(epilog="Example: ./pbrl play out/push.bag --rate 2")
+def play(
+    bag: Annotated[Path, typer.Argument(help="Bag folder or .mcap file.")],
+    rate: Annotated[float, typer.Option(min=0.01, help="Times faster than it was recorded.")] = 1.0,
+    domain: Domain = None,
+) -> int:
+    """Publish a recording again."""
+    return _hand_over("play", bag=bag, rate=rate, domain=domain)
+
+
+@app.command(epilog="Example: ./pbrl info out/push.bag")
+def info(bag: Bag, mapping: Mapping = None) -> int:
+    """Say what a recording holds: topics, rates, objects, grasps."""
+    return _hand_over("info", bag=bag, mapping=mapping)
+
+
+@app.command(epilog="Example: ./pbrl bench wheel --quick")
+def bench(
+    name: Annotated[str, typer.Argument(help="sim, wheel, cabinet, recorder or mcap.")],
+    out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,
+    seed: Seed = 0,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A smaller version that still measures, under a minute.")
+    ] = False,
+) -> int:
+    """Measure one group of acceptance rows; the last line is the report as JSON."""
+    return _hand_over("bench", name=name, out=out, seed=seed, quick=quick)
 
 
 def main() -> None:
-    print("hello")
+    """Run the command line of this process and exit with its code."""
+    signal.signal(signal.SIGTERM, _leave)
+    sys.exit(run_arguments(sys.argv[1:]))
+
+
+def run_arguments(arguments: Sequence[str]) -> int:
+    """Run one command and return its exit code; every error ends here, as one line on stderr."""
+    try:
+        return int(app(args=list(arguments), prog_name="pbrl", standalone_mode=False) or 0)
+    except TyperException as error:
+        return _complain(" ".join(error.format_message().split()) or "see --help", 2)
+    except KeyboardInterrupt:
+        return _complain("stopped", 130)
+    except Exception as error:
+        if _is_for_the_user(error):
+            return _complain(" ".join(str(error).split()), 2)
+        return _complain(_fault(error), 1)
+
+
+def _is_for_the_user(error: Exception) -> bool:
+    loaded = [(sys.modules[module], name) for module, name in USER_ERRORS.items() if module in sys.modules]
+    return isinstance(error, tuple(getattr(module, name) for module, name in loaded))
+
+
+def _fault(error: Exception) -> str:
+    """Describe an error that nobody foresaw; PBRL_TRACEBACK=1 shows where it comes from."""
+    if os.environ.get("PBRL_TRACEBACK"):
+        traceback.print_exception(error)
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    where = f"{Path(frame.filename).name}:{frame.lineno}"
+    return f"a fault in pbrl at {where}, {what}; PBRL_TRACEBACK=1 shows more"
+
+
+def _complain(message: str, code: int) -> int:
+    print(f"pbrl: {message}", file=sys.stderr)
+    return code
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """Let SIGTERM unwind the stack, so that every `with` stops what it started."""
+    raise SystemExit(128 + number)

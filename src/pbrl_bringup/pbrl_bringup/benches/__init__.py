@@ -1,0 +1,1 @@
+"""Benches: each measures one group of acceptance rows. One module a bench, imported when it is run."""

@@ -1,0 +1,88 @@
+"""A real PR2 pulls real doors open: hinge and path, learned from forces and the handle's way alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_bag import read_recording
+from pbrl_bringup.benches.rows import Measured, at_most, within
+from pbrl_bringup.errors import BringupError
+from pbrl_bringup.paths import config_file, workspace
+from pbrl_model.fit import FitOptions, ObjectFit, fit_recording
+from pbrl_model.predict import predict, unlearned
+
+Array = NDArray[np.float64]
+
+RECORDING = "pr2_cabinet/ikea_cabinet.csv"
+RADIUS, SLACK = 0.300, 0.015  # [m]
+
+
+def measure(seed: int, quick: bool, out: Path) -> Measured:
+    """Fit the hinge of the IKEA cabinet and compare with its radius and with the handle's recorded path."""
+    recording = read_recording(data_file(RECORDING), config_file("mappings", "pr2_cabinet"))
+    options = FitOptions(model_class="hinge", seed=seed)
+    fit = fit_recording(recording, options)
+    name, found = next(iter(fit.objects.items()))
+    radius = found.posterior.column("hinge_radius").ravel()
+    recorded = np.vstack([motion.pose[:, :2] for motion in found.motions])
+    deviation = path_deviation(found, recorded)
+    line = straight_line_deviation(recorded)
+    unlearned_row = unlearned(recording.bodies[name]).to_vector()[None]
+    motion = found.motions[-1]
+    ends = [predict(motion, rows, found.body).mean[-1, :2] for rows in (unlearned_row, found.posterior.rows())]
+    missed = [float(np.hypot(*(end - motion.pose[-1, :2]))) for end in ends]
+    return Measured(
+        [
+            within(
+                "IKEA cabinet: radius of the hinge, posterior mean",
+                radius.mean(),
+                "m",
+                RADIUS,
+                SLACK,
+                sd=float(radius.std()),
+            ),
+            at_most(
+                "IKEA cabinet: handle's recorded path, worst distance from the learned hinge's circle",
+                float(deviation.max()),
+                "m",
+                0.01,
+                straight_line_m=float(line.max()),
+                mean_m=float(deviation.mean()),
+            ),
+        ],
+        {
+            "fit": fit.to_report(),
+            "seconds_of_fit": fit.seconds,
+            "open_loop_end_error_m": {"before": missed[0], "after": missed[1]},
+        },
+    )
+
+
+def path_deviation(found: ObjectFit, recorded: Array) -> Array:
+    """Return how far each recorded place (n, 2) is from the circle that the mean hinge lets the handle move on [m]."""
+    centre = np.array([found.posterior.column(name).mean() for name in ("hinge_x", "hinge_y")])
+    radius = float(found.posterior.column("hinge_radius").mean())
+    return np.abs(np.hypot(*(recorded - centre).T) - radius)
+
+
+def straight_line_deviation(recorded: Array) -> Array:
+    """Return how far each place (n, 2) is from the best straight line: what a drawer would leave [m]."""
+    centred = recorded - recorded.mean(axis=0)
+    across = np.linalg.svd(centred, full_matrices=False)[2][1]
+    return np.abs(centred @ across)
+
+
+def data_file(name: str) -> Path:
+    """Return a file of the shared data sets.
+
+    Raises:
+        BringupError: it is not there.
+    """
+    folders = [workspace() / "data", workspace().parent / "shared/data"]
+    for folder in folders:
+        if (folder / name).is_file():
+            return folder / name
+    raise BringupError(f"expected {name} below {' or '.join(map(str, folders))}, found none; put the data set there")

@@ -1,0 +1,37 @@
+"""`./pbrl record`: the recorder node, until Ctrl-C or for a time."""
+
+from __future__ import annotations
+
+import signal
+import tempfile
+from pathlib import Path
+
+from pbrl_bringup.errors import BringupError
+from pbrl_bringup.files import refuse_existing
+from pbrl_bringup.graph import Node, node_command, outside_environment
+from pbrl_bringup.processes import Programs
+from pbrl_bringup.terminal import say
+
+FOREVER = 10.0**9  # [s]
+
+
+def command(out: Path, duration: float, domain: int | None) -> int:
+    """Record every topic of the environment's graph.
+
+    Raises:
+        BringupError: `out` exists, or the recorder failed.
+    """
+    refuse_existing(out)
+    node = Node(package="pbrl_bag", executable="recorder_node", parameters={"output": str(out)})
+    with tempfile.TemporaryDirectory() as logs, Programs(Path(logs), outside_environment(domain)) as programs:
+        recorder = programs.start("recorder", node_command("recorder", node))
+        say(f"pbrl: recording into {out}; {f'for {duration:g} s' if duration else 'Ctrl-C ends it'}")
+        try:
+            programs.ended("recorder", duration or FOREVER)
+        except KeyboardInterrupt:
+            say("pbrl: closing the bag")
+        code = programs.stop("recorder")
+        if code not in (0, -signal.SIGINT):
+            raise BringupError(recorder.last_line())
+        say(f"pbrl: {recorder.last_line()}")
+    return 0

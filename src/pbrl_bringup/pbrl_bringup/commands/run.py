@@ -1,0 +1,30 @@
+"""`./pbrl run GRAPH`: nodes as processes, until Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from pbrl_bringup.graph import load_graph, parse_setting, running_graph, wait_ready, with_parameters
+from pbrl_bringup.ros.client import GraphClient
+from pbrl_bringup.terminal import say
+
+
+def command(graph: str, settings: Sequence[str], optional: Sequence[str], domain: int | None, logs: Path) -> int:
+    """Start a graph, say when each node is ready, and stay until Ctrl-C or until a node ends.
+
+    Raises:
+        BringupError: no such graph, node or parameter; a node that ends by itself.
+    """
+    chosen = with_parameters(load_graph(graph), dict(map(parse_setting, settings)), tuple(optional))
+    number = int(os.environ.get("ROS_DOMAIN_ID", "0")) if domain is None else domain
+    say(f"pbrl: {chosen.description.strip()}")
+    with running_graph(chosen, logs, number) as programs, GraphClient(number, programs.check) as client:
+        wait_ready(chosen, client)
+        say(f"pbrl: {', '.join(chosen.nodes)} run in ROS_DOMAIN_ID {number}, output in {logs}; Ctrl-C stops them")
+        try:
+            client.stay()
+        except KeyboardInterrupt:
+            say("pbrl: stopping")
+    return 0

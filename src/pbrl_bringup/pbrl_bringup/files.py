@@ -1,0 +1,87 @@
+"""Writing whole files and folders: nothing half-written is ever seen under its final name."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pbrl_bringup.errors import BringupError
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file under another name first, then rename it."""
+    temporary = _beside(path)
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise BringupError(f"{path}: cannot be written: {error.strerror}; choose another --out") from error
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write strict JSON, whole or not at all; NaN becomes null."""
+    write_text(path, json.dumps(without_nan(value), indent=2, allow_nan=False) + "\n")
+
+
+def without_nan(value: Any) -> Any:
+    """Return `value` with NaN and infinities, which JSON does not have, replaced by None."""
+    if isinstance(value, dict):
+        return {key: without_nan(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [without_nan(item) for item in value]
+    if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
+        return None
+    return value
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Yield a temporary folder beside `path` that takes its name if the block ends well.
+
+    Raises:
+        BringupError: `path` exists and is not an empty folder, or cannot be made.
+    """
+    refuse_existing(path)
+    temporary = _beside(path)
+    try:
+        temporary.mkdir(parents=True)
+    except OSError as error:
+        raise BringupError(f"{path}: cannot be made: {error.strerror}; choose another --out") from error
+    try:
+        yield temporary
+        if path.exists():
+            path.rmdir()
+        temporary.replace(path)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def refuse_existing(path: Path) -> None:
+    """Raise BringupError where `path` holds something that would be overwritten."""
+    if path.is_dir() and not any(path.iterdir()):
+        return
+    if path.exists():
+        raise BringupError(f"{path}: expected a name that is free, but it exists; choose another --out or remove it")
+
+
+def output_folder(path: Path) -> Path:
+    """Make the folder for results, if need be, and return it.
+
+    Raises:
+        BringupError: it is a file or cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BringupError(f"{path}: expected a folder for results: {error.strerror}; choose another --out") from error
+    return path
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{path.name}.{os.getpid()}.part")

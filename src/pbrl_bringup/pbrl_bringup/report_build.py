@@ -1,0 +1,279 @@
+"""From a recording and what was learned of it to what the page shows."""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections.abc import Sequence
+from datetime import datetime
+from importlib.metadata import version
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_bag import BodyGeometry, Recording
+from pbrl_bringup.replay import Replay
+from pbrl_bringup.report_data import (
+    Contact,
+    Episode,
+    HeldOut,
+    Hinge,
+    Made,
+    ObjectReport,
+    Parameter,
+    Point,
+    Pose,
+    Report,
+    Truth,
+    Wheel,
+)
+from pbrl_bringup.verdict import (
+    ahead_verdict,
+    free_verdict,
+    hinge_verdict,
+    learning_verdict,
+    spoken,
+    spread_radius,
+    wheel_verdict,
+)
+from pbrl_model.heldout import Heldout
+from pbrl_model.posterior import Posterior
+from pbrl_model.priors import table2_prior
+
+Array = NDArray[np.float64]
+
+FRAMES = 15.0  # [Hz] of the pictures; tags come no faster
+SHOWN_DRAWS = 20
+CLOUD = 400  # dots of the posterior
+CHI_95 = math.sqrt(5.991)  # radius that holds 95 % of a normal in the plane, in standard deviations
+DIGITS = 5  # of metres and radians in the page's data: a hundredth of a millimetre
+MEANINGS = {
+    "mass": "mass",
+    "wheel_x": "held point, in front of the middle",
+    "wheel_y": "held point, left of the middle",
+    "wheel_theta": "direction in which the wheel points",
+    "mu_x": "friction along the wheel, as a share of the weight",
+    "mu_y": "friction across the wheel, as a share of the weight",
+    "mu_ground": "friction of the other feet, as a share of the weight",
+    "hinge_x": "hinge in the room, x",
+    "hinge_y": "hinge in the room, y",
+    "hinge_radius": "distance from the hinge to the held point",
+    "anchor_x": "hinge arm on the body, x",
+    "anchor_y": "hinge arm on the body, y",
+}
+
+
+def object_report(
+    geometry: BodyGeometry,
+    posterior: Posterior,
+    replays: Sequence[Replay],
+    heldout: Heldout | None,
+    rng: np.random.Generator,
+    locked: Sequence[Point] | None = None,
+) -> ObjectReport:
+    """Put together everything about one object.
+
+    Args:
+        geometry: known outline and casters.
+        posterior: what was learned.
+        replays: its pushes, predicted.
+        heldout: errors on what the fit did not see.
+        rng: chooses the draws that are shown.
+        locked: [m] places of the casters that were locked, for a demonstration that shows the truth
+            after the fit; None where nobody knows.
+    """
+    canonical = posterior.canonical()
+    starts = sorted({float(replay.time[0]) for replay in replays})
+    episodes = [_episode(starts.index(float(replay.time[0])) + 1, replay, rng) for replay in replays]
+    wheel = _wheel(canonical, rng) if "wheel_x" in canonical.names else None
+    return ObjectReport(
+        name=geometry.name,
+        verdict=_verdict(geometry, canonical),
+        detail=_detail(replays, episodes),
+        model_class=canonical.model_class,
+        footprint=_points(geometry.footprint),
+        casters=_points(geometry.casters),
+        parameters=_parameters(geometry, canonical, rng),
+        wheel=wheel,
+        hinge=_hinge(canonical, rng) if "hinge_x" in canonical.names else None,
+        episodes=episodes,
+        heldout=None if heldout is None else _heldout(heldout),
+        truth=None if locked is None else _truth(wheel, locked),
+    )
+
+
+def whole_report(
+    title: str, recording: Recording, objects: Sequence[ObjectReport], command: str, seed: int | None, seconds: float
+) -> Report:
+    """Put the page together; the first object's verdict is on top."""
+    if not objects:
+        return Report(
+            title=title,
+            verdict="Nothing was learned: no object was held and moved in this recording.",
+            detail="",
+            room=_points(recording.room),
+            objects=[],
+            made=_made(recording, command, seed, seconds),
+        )
+    return Report(
+        title=title,
+        verdict=objects[0].verdict,
+        detail=objects[0].detail,
+        room=_points(recording.room),
+        objects=list(objects),
+        made=_made(recording, command, seed, seconds),
+    )
+
+
+def ellipse(points: Array, count: int = 73) -> Array:
+    """Return the (count, 2) outline that holds 95 % of a normal with the moments of the (n, 2) points."""
+    turn = np.linspace(0.0, 2.0 * np.pi, count)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    values, vectors = np.linalg.eigh(np.cov(points.T))
+    axes = vectors * np.sqrt(np.maximum(values, 0.0))
+    return points.mean(axis=0) + CHI_95 * circle @ axes.T
+
+
+def _named(posterior: Posterior) -> dict[str, Array]:
+    return {name: posterior.column(name).ravel() for name in posterior.names}
+
+
+def _verdict(geometry: BodyGeometry, posterior: Posterior) -> str:
+    draws = _named(posterior)
+    name = spoken(geometry.name)
+    if posterior.model_class == "hinge":
+        return hinge_verdict(name, draws)
+    if "wheel_x" in draws:
+        return wheel_verdict(name, draws, geometry.footprint, geometry.casters)
+    return free_verdict(name, draws)
+
+
+def _detail(replays: Sequence[Replay], episodes: Sequence[Episode]) -> str:
+    whole = [number for number, each in enumerate(replays) if each.restart is None]
+    if not whole:
+        return ""
+    last = episodes[whole[-1]]
+    text = learning_verdict(last.end_before, last.end_after, last.time[-1], fitted=last.fitted)
+    ahead = [each for each in episodes if each.restart is not None]
+    return f"{text} {ahead_verdict(ahead[-1].restart, ahead[-1].end_before, ahead[-1].end_after)}" if ahead else text
+
+
+def _episode(number: int, replay: Replay, rng: np.random.Generator) -> Episode:
+    step = max(1, round(1.0 / (FRAMES * float(np.diff(replay.time).mean()))))
+    rows = np.unique(np.append(np.arange(0, len(replay.time), step), len(replay.time) - 1))
+    after = replay.after[:, rows]
+    shown = np.sort(rng.choice(len(after), min(SHOWN_DRAWS, len(after)), replace=False))
+    mean = after.mean(axis=0)
+    recorded, before = replay.recorded[rows], replay.before[rows]
+    return Episode(
+        label=_label(number, replay),
+        restart=replay.restart,
+        end_before=replay.end_error(replay.before),
+        end_after=replay.end_error(replay.after.mean(axis=0)),
+        time=[round(float(t), 3) for t in replay.time[rows] - replay.time[0]],
+        recorded=_poses(recorded),
+        before=_poses(before),
+        after=_poses(mean),
+        draws=[_poses(after[k]) for k in shown],
+        wrench=[(round(float(a), 2), round(float(b), 2), round(float(c), 3)) for a, b, c in replay.wrench[rows]],
+        contacts=[
+            Contact(gripper=side, point=(float(point[0]), float(point[1])))
+            for side, point in sorted(replay.contacts.items())
+        ],
+        error_before=[float(d) for d in np.hypot(*(before - recorded)[:, :2].T)],
+        error_after=[float(d) for d in np.hypot(*(mean - recorded)[:, :2].T)],
+        fitted=replay.fitted,
+    )
+
+
+def _label(number: int, replay: Replay) -> str:
+    how = "predicted as a whole" if replay.restart is None else f"predicted {replay.restart:g} s at a time"
+    return f"push {number}, {how}" + ("" if replay.fitted else ", not fitted")
+
+
+def _wheel(posterior: Posterior, rng: np.random.Generator) -> Wheel:
+    draws = _named(posterior)
+    theta = draws.get("wheel_theta", np.zeros_like(draws["wheel_x"]))
+    points = np.column_stack([draws["wheel_x"], draws["wheel_y"]])
+    mean = points.mean(axis=0)
+    return Wheel(
+        draws=_poses(_some(np.column_stack([points, theta]), rng)),
+        mean=(float(mean[0]), float(mean[1])),
+        ellipse=_points(ellipse(points)),
+        radius95=spread_radius(points),
+    )
+
+
+def _hinge(posterior: Posterior, rng: np.random.Generator) -> Hinge:
+    draws = _named(posterior)
+    rows = np.column_stack([draws["hinge_x"], draws["hinge_y"], draws["hinge_radius"]])
+    return Hinge(
+        draws=_poses(_some(rows, rng)),
+        mean=(float(rows[:, 0].mean()), float(rows[:, 1].mean()), float(rows[:, 2].mean())),
+        ellipse=_points(ellipse(rows[:, :2])),
+    )
+
+
+def _parameters(geometry: BodyGeometry, posterior: Posterior, rng: np.random.Generator) -> list[Parameter]:
+    prior = table2_prior(geometry, posterior.model_class)
+    ranges = np.quantile(prior.sample(rng, 4000), [0.05, 0.95], axis=0).T
+    believed = dict(zip(prior.names, ranges, strict=True))
+    return [
+        Parameter(
+            name=name,
+            meaning=MEANINGS.get(name, ""),
+            mean=float(mean),
+            sd=float(sd),
+            unit=unit,
+            prior=f"{_short(believed[name][0])} to {_short(believed[name][1])}" if name in believed else "",
+        )
+        for name, mean, sd, unit in zip(posterior.names, posterior.mean(), posterior.sd(), posterior.units, strict=True)
+    ]
+
+
+def _heldout(found: Heldout) -> HeldOut:
+    return HeldOut(
+        windows=found.count,
+        horizon=found.seconds,
+        position_before=found.before.final_position,
+        position_after=found.after.final_position,
+        yaw_before=found.before.final_yaw,
+        yaw_after=found.after.final_yaw,
+    )
+
+
+def _truth(wheel: Wheel | None, locked: Sequence[Point]) -> Truth:
+    near = min((math.dist(wheel.mean, point) for point in locked), default=None) if wheel else None
+    note = "the caster that the simulator had locked; it was asked after the fit, for comparison only"
+    return Truth(note=note, locked=[(float(x), float(y)) for x, y in locked], distance=near)
+
+
+def _made(recording: Recording, command: str, seed: int | None, seconds: float) -> Made:
+    return Made(
+        command=command,
+        recording=str(recording.path),
+        seed=seed,
+        created=datetime.now().strftime("%Y-%m-%d %H:%M"),
+        seconds=seconds,
+        versions={
+            "pbrl": version("pbrl_bringup"),
+            "Python": platform.python_version(),
+            "numpy": np.__version__,
+        },
+    )
+
+
+def _some(rows: Array, rng: np.random.Generator) -> Array:
+    return rows[np.sort(rng.choice(len(rows), min(CLOUD, len(rows)), replace=False))]
+
+
+def _poses(rows: Array) -> list[Pose]:
+    return [(float(x), float(y), float(t)) for x, y, t in np.round(rows, DIGITS)]
+
+
+def _points(rows: Array) -> list[Point]:
+    return [(float(x), float(y)) for x, y in np.round(rows, DIGITS)]
+
+
+def _short(value: float) -> str:
+    return (f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}").replace("-", "−")

@@ -1,0 +1,123 @@
+"""A client of a running graph: waits for what nodes offer, calls their services, keeps latched messages."""
+
+# rclpy has no types of its own.
+# mypy: disable-error-code="no-untyped-call,attr-defined"
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Self
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from pbrl_bringup.errors import BringupError
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE)
+SPIN = 0.05  # [s] how long one turn waits; bounds how late the end of a node is noticed
+
+
+class Heard:
+    """The last message of a topic, when it came [ns of wall time], and how many there have been."""
+
+    def __init__(self) -> None:
+        self.message: Any = None
+        self.count = 0
+        self.time_ns = 0
+        self.subscription: Any = None
+
+    def __call__(self, message: Any) -> None:
+        """Take a message; the subscription's callback."""
+        self.message = message
+        self.count += 1
+        self.time_ns = time.time_ns()
+
+
+class GraphClient:
+    """One small node beside a graph, in the graph's domain.
+
+    Args:
+        domain: ROS_DOMAIN_ID of the graph.
+        check: called while waiting; raises where a node of the graph has died.
+    """
+
+    def __init__(self, domain: int, check: Callable[[], None] = lambda: None) -> None:
+        os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        self._check = check
+        self._context = Context()
+        # Ctrl-C stays with Python: the caller stops its nodes in order.
+        rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node("pbrl_client", context=self._context, enable_rosout=False)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    def listen(self, kind: type, topic: str, *, latched: bool = True) -> Heard:
+        """Subscribe, and return what holds the last message."""
+        heard = Heard()
+        qos = LATCHED if latched else QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+        heard.subscription = self._node.create_subscription(kind, topic, heard, qos)
+        return heard
+
+    def forget(self, heard: Heard) -> None:
+        """Stop listening."""
+        self._node.destroy_subscription(heard.subscription)
+
+    def wait_for_topic(self, topic: str, timeout: float) -> None:
+        """Wait until a node publishes a topic."""
+        self.wait_until(lambda: self._node.count_publishers(topic) > 0, timeout, f"nobody publishes {topic}")
+
+    def wait_for_service(self, service: str, timeout: float) -> None:
+        """Wait until a node offers a service."""
+
+        def offered() -> bool:
+            return any(name == service for name, _ in self._node.get_service_names_and_types())
+
+        self.wait_until(offered, timeout, f"nobody offers {service}")
+
+    def call(self, kind: Any, service: str, request: Any, timeout: float) -> Any:
+        """Call a service and return its response."""
+        client = self._node.create_client(kind, service)
+        try:
+            self.wait_until(client.service_is_ready, timeout, f"nobody offers {service}")
+            future = client.call_async(request)
+            self.wait_until(future.done, timeout, f"{service} has not answered")
+            return future.result()
+        finally:
+            self._node.destroy_client(client)
+
+    def stay(self) -> None:
+        """Handle messages for ever; a node that dies or Ctrl-C ends it."""
+        while True:
+            self._check()
+            self._executor.spin_once(timeout_sec=SPIN)
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float, complaint: str) -> None:
+        """Handle messages until a condition holds.
+
+        Raises:
+            BringupError: it does not within `timeout` seconds, or a node has died.
+        """
+        deadline = time.monotonic() + timeout
+        while not condition():
+            self._check()
+            if time.monotonic() > deadline:
+                raise BringupError(f"{complaint} after {timeout:.0f} s; the nodes' logs say why")
+            self._executor.spin_once(timeout_sec=SPIN)

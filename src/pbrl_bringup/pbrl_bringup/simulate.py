@@ -1,0 +1,225 @@
+"""A push without middleware: simulator, controller and recorder in one process, as fast as the machine goes.
+
+The observations become the same messages on the same topics as from `sim_node`, and the controller is
+ticked as in its node: with each joint state. What is left out is the transport, so the same scene,
+plan and seed make the same bag, byte for byte.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import singledispatchmethod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from std_msgs.msg import String
+
+from bullet_sim.scene import Scene
+from krang_sim.messages import stamp, to_messages
+from krang_sim.observations import (
+    GraspState,
+    JointStates,
+    KnownScene,
+    RobotDescription,
+    TagReading,
+    WristReading,
+)
+from krang_sim.session import KrangSession
+from pbrl_bag.writer import BagWriter
+from pbrl_bringup.errors import BringupError
+from pbrl_bringup.files import refuse_existing
+from pbrl_bringup.paths import config_file
+from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
+from pbrl_control.loop import ControlLoop, LoopCommand
+from pbrl_control.percept import BodyShape, Grip, Percept, Tag
+from pbrl_control.push import GripperAnswer, GripperRequest, Phase, PushCommand
+from pbrl_control.push_plan import PushPlan
+from pbrl_control.ros.conversions import arm_to_msg, base_to_msg, twist_to_msg
+from pbrl_control.settings import ControllerSettings, load_section
+
+AFTERWARDS = 0.5  # [s] recorded after the end, so that tags that are under way arrive
+LONGEST = 180.0  # [s] of simulated time; a push that takes longer hangs
+
+
+@dataclass(frozen=True)
+class SimulatedPush:
+    """What came of it.
+
+    Attributes:
+        bag: the folder of the recording.
+        phase: "done" or "failed".
+        status: a sentence; of a failed push, why.
+        seconds: simulated time [s].
+        messages: how many were recorded.
+    """
+
+    bag: Path
+    phase: str
+    status: str
+    seconds: float
+    messages: int
+
+
+def simulate_push(
+    scene: Scene,
+    plan: PushPlan,
+    seed: int,
+    bag: Path,
+    *,
+    gui: bool = False,
+    advance: Callable[[float, str], None] | None = None,
+) -> SimulatedPush:
+    """Perform a push plan in a scene and record it.
+
+    Args:
+        scene: with its concealed part, which reaches the simulator only.
+        plan: the push.
+        seed: of world and sensors.
+        bag: folder of the recording, made at the end; it must not exist.
+        gui: open Bullet's window.
+        advance: called now and then with the simulated time [s] and the phase.
+
+    Raises:
+        BringupError: `bag` exists, or the push did not end.
+        SimError: the scene cannot be built.
+        ControlError: the plan does not fit the robot.
+    """
+    refuse_existing(bag)
+    unfinished = bag.with_name(f".{bag.name}.part")
+    bag.parent.mkdir(parents=True, exist_ok=True)
+    settings = load_section(config_file("params", "body_controller"), ControllerSettings, "settings")
+    with KrangSession(scene, seed=seed, gui=gui) as session:
+        # The name inside the bag is the folder's, so the folder is made under its own name elsewhere.
+        writer = BagWriter(unfinished / bag.name, live=False)
+        try:
+            with writer:
+                end = _run(_Run(session, plan, settings, writer), advance or (lambda time, phase: None))
+            (unfinished / bag.name).replace(bag)
+            unfinished.rmdir()
+        except BaseException:
+            if (unfinished / bag.name).exists():
+                writer.discard()
+                unfinished.rmdir()
+            raise
+        return SimulatedPush(bag, str(end.phase), end.status, session.time, writer.message_count)
+
+
+def _run(run: _Run, advance: Callable[[float, str], None]) -> PushCommand:
+    """Step until the push has ended and the last tags have arrived."""
+    stop: float | None = None
+    while stop is None or run.session.time < stop:
+        run.step()
+        if run.session.time > LONGEST:
+            raise BringupError(
+                f"{run.plan.name}: expected the push to end within {LONGEST:.0f} s, it is in {run.phase}"
+            )
+        if stop is None and run.last is not None and run.last.finished:
+            stop = run.session.time + AFTERWARDS
+        advance(run.session.time, run.phase)
+    assert run.last is not None
+    return run.last
+
+
+def status_text(command: PushCommand) -> str:
+    """Return what `/push/status` says at this moment."""
+    return f"failed: {command.status}" if command.phase == Phase.FAILED else str(command.phase)
+
+
+def type_name(message: Any) -> str:
+    """Return the name of a message's type, e.g. "geometry_msgs/msg/PoseStamped"."""
+    package = type(message).__module__.partition(".")[0]
+    return f"{package}/msg/{type(message).__name__}"
+
+
+class _Run:
+    """One session, its controller and its recording."""
+
+    def __init__(self, session: KrangSession, plan: PushPlan, settings: ControllerSettings, writer: BagWriter) -> None:
+        self.session = session
+        self.plan = plan
+        self.last: PushCommand | None = None
+        self._settings = settings
+        self._writer = writer
+        self._loop: ControlLoop | None = None
+        self._posture: Posture | None = None
+        self._tags: dict[str, Tag] = {}
+        self._wrenches: dict[str, np.ndarray] = {}
+        self._grips: dict[str, Grip] = {}
+        self._bodies: dict[str, BodyShape] = {}
+
+    @property
+    def phase(self) -> str:
+        """Where the push is."""
+        return "start" if self.last is None else str(self.last.phase)
+
+    def step(self) -> None:
+        """Advance the simulator by one step, record what it says, and control at each joint state."""
+        observations = self.session.step()
+        for observation in observations:
+            for topic, message in to_messages(observation):
+                self.record(topic, message)
+            self.perceive(observation)
+        if self._loop and self._posture and any(isinstance(each, JointStates) for each in observations):
+            percept = Percept(
+                self._posture, dict(self._tags), dict(self._wrenches), dict(self._grips), dict(self._bodies)
+            )
+            self.obey(self._loop.tick(self.session.time, percept))
+
+    def record(self, topic: str, message: Any) -> None:
+        """Write one message at the present time."""
+        self._writer.write(topic, type_name(message), message, round(self.session.time * 1e9))
+
+    def obey(self, command: LoopCommand) -> None:
+        """Send a command to the robot, record it as its nodes publish it, and carry out the grippers' requests."""
+        if self.last is None or command.push.phase != self.last.phase:
+            self.record("/push/status", String(data=status_text(command.push)))
+        self.last = command.push
+        for target, twist in command.push.twists.items():
+            self.record("/object_twist_command", twist_to_msg(target, twist, stamp(self.session.time)))
+        self.session.command_base(command.body.base_v, command.body.base_w)
+        self.record("/cmd_vel", base_to_msg(command.body.base_v, command.body.base_w))
+        for side in SIDES:
+            self.session.command_arm(side, command.body.arm(side).tolist())
+            self.record(f"/{side}_arm_velocity_controller/commands", arm_to_msg(command.body.arm(side)))
+        for request in command.push.requests:
+            self._answer(request)
+
+    def _answer(self, request: GripperRequest) -> None:
+        assert self._loop is not None
+        if request.action == "grasp":
+            outcome = self.session.grasp(request.side, request.object)
+        else:
+            outcome = self.session.release(request.side)
+        self._loop.answer(
+            GripperAnswer(request.action, request.side, outcome.success, outcome.message, outcome.distance)
+        )
+
+    @singledispatchmethod
+    def perceive(self, observation: object) -> None:
+        """Take in what the controller uses; the rest of the observations is only recorded."""
+
+    @perceive.register
+    def _(self, observation: RobotDescription) -> None:
+        self._loop = ControlLoop(RobotKinematics(observation.urdf), self.plan, self._settings)
+
+    @perceive.register
+    def _(self, observation: JointStates) -> None:
+        self._posture = Posture.from_joint_states(observation.names, observation.position.tolist())
+
+    @perceive.register
+    def _(self, observation: TagReading) -> None:
+        self._tags[observation.tag] = Tag(observation.time, observation.position, observation.quaternion)
+
+    @perceive.register
+    def _(self, observation: WristReading) -> None:
+        self._wrenches[observation.side] = np.concatenate([observation.force, observation.torque])
+
+    @perceive.register
+    def _(self, observation: GraspState) -> None:
+        self._grips = {hold.gripper: Grip(hold.object, hold.contact_point) for hold in observation.holds}
+
+    @perceive.register
+    def _(self, observation: KnownScene) -> None:
+        self._bodies = {body.name: BodyShape(body.footprint, body.height) for body in observation.bodies}
