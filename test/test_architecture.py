@@ -25,17 +25,18 @@ ALLOWED["pbrl_bringup"] = {"pbrl_msgs", *ALLOWED}
 FILES = sorted((ROOT / "src").glob("*/*/**/*.py"))
 
 
-def imports(path: Path) -> Iterator[tuple[str, int, bool]]:
-    """Yield (module, line, at top level) for every import statement of a file."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    top = set(map(id, tree.body)) | {
-        id(node) for guard in tree.body if isinstance(guard, ast.If | ast.Try) for node in ast.walk(guard)
-    }
-    for node in ast.walk(tree):
+def imports(path: Path) -> Iterator[tuple[str, int]]:
+    """Yield (module, line) for every import statement of a file, those inside functions too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from ((alias.name, node.lineno, id(node) in top) for alias in node.names)
+            yield from ((alias.name, node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            yield node.module or "", node.lineno, id(node) in top
+            yield node.module or "", node.lineno
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT / "src").with_suffix("").parts[1:]
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def package_of(path: Path) -> str:
@@ -45,7 +46,7 @@ def package_of(path: Path) -> str:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT / "src")))
 def test_file_keeps_the_direction_of_imports(path: Path) -> None:
     package = package_of(path)
-    for module, line, _ in imports(path):
+    for module, line in imports(path):
         other = module.split(".")[0]
         if other in ALLOWED or other == "pbrl_msgs":
             allowed = {*ALLOWED[package], package}
@@ -54,17 +55,25 @@ def test_file_keeps_the_direction_of_imports(path: Path) -> None:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT / "src")))
 def test_only_nodes_import_rclpy(path: Path) -> None:
-    for module, line, _ in imports(path):
+    for module, line in imports(path):
         if module.split(".")[0] == "rclpy":
             assert "ros" in path.relative_to(ROOT / "src").parts, f"{path}:{line}: rclpy belongs under ros/"
 
 
 def test_no_import_ring_inside_a_package() -> None:
     graph: dict[str, set[str]] = {}
+    modules = {module_name(path) for path in FILES}
     for path in FILES:
-        parts = path.relative_to(ROOT / "src").with_suffix("").parts[1:]
-        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-        graph[name] = {module for module, _, _ in imports(path)} - {name}
+        name = module_name(path)
+        graph[name] = {module for module, _ in imports(path)} - {name}
+        # `from package import module` is an edge to the module, not to the package's list of public names.
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom):
+                inside = {f"{node.module}.{alias.name}" for alias in node.names} & modules
+                graph[name] |= inside
+                if len(inside) == len(node.names):
+                    graph[name].discard(node.module or "")
     done: set[str] = set()
 
     def visit(name: str, trail: tuple[str, ...]) -> None:

@@ -87,11 +87,18 @@ def fit(
     mapping: Mapping = None,
     out: Out = Path("out/fit"),
     model_class: Annotated[
-        str, typer.Option(help="free, wheel, hinge; auto: hinge where only a point of the body was seen, else wheel.")
+        str,
+        typer.Option(
+            help="free, wheel, wheel+ground or hinge; auto: hinge where only a point of the body was seen, "
+            "else wheel+ground (a wheel, and friction of the whole body on the floor)."
+        ),
     ] = "auto",
     likelihood: Annotated[Likelihood, typer.Option(help="How motion is compared.")] = Likelihood.WINDOWED,
     draws: Annotated[
         int | None, typer.Option(min=10, help="Posterior draws to keep from each chain. Default: the model's.")
+    ] = None,
+    priors: Annotated[
+        Path | None, typer.Option(help="YAML file of priors, as config/params/priors.yaml. Default: what stands there.")
     ] = None,
     seed: Seed = 0,
 ) -> int:
@@ -104,6 +111,7 @@ def fit(
         model_class=model_class,
         likelihood=str(likelihood),
         draws=draws,
+        priors=priors,
         seed=seed,
     )
 

@@ -17,20 +17,18 @@ With P0 = 0 and drag = 0 this is the thesis's likelihood: (25) over one-step win
 from __future__ import annotations
 
 import math
-import threading
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_model.geometry import MassProperties
+from pbrl_model.rollout import KERNEL_LOCK
 from pbrl_model.window_kernel import simulate_parallel, simulate_serial
 from pbrl_model.windows import Windows
 
 Array = NDArray[np.float64]
 
-KERNEL_LOCK = threading.Lock()
-"""Some of numba's threading layers end the process when two threads start parallel work at once."""
 SERIAL_STEPS = 40_000
 """Below this many body steps in all, waking the other cores costs more than it saves."""
 START_STEP = 0.1

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 DT = 0.01  # [s]
 SERIAL_STEPS = 20_000  # below this many body steps in all, waking the other cores costs more than it saves
 # Some of numba's threading layers end the process when two threads start parallel work at once.
-_one_caller = threading.Lock()
+KERNEL_LOCK = threading.Lock()
 
 
 def rollout(
@@ -114,7 +114,7 @@ def _run(
     out = np.empty((rows.shape[0], windows, longest + 1, 6 if of_com else 3))
     arguments = (rows, start, forces, counts, float(inertia_per_mass), centre, origin, float(dt), out)
     if parallel and rows.shape[0] * int(counts.sum()) > SERIAL_STEPS:
-        with _one_caller:
+        with KERNEL_LOCK:
             kernel.rollout_parallel(*arguments)
     else:
         kernel.rollout_serial(*arguments)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -18,23 +19,33 @@ from pbrl_bringup.report_page import number, rounded, write_page
 from pbrl_bringup.terminal import output, say, table
 from pbrl_model.arviz_bridge import save_posterior
 from pbrl_model.fit import Fit, FitOptions, fit_recording
+from pbrl_model.prior_options import load_prior_options
 
 
 def command(
-    bag: Path, mapping: Path | None, out: Path, model_class: str, likelihood: str, draws: int | None, seed: int
+    bag: Path,
+    mapping: Path | None,
+    out: Path,
+    model_class: str,
+    likelihood: str,
+    draws: int | None,
+    priors: Path | None,
+    seed: int,
 ) -> int:
     """Learn every object of a recording.
 
     Raises:
         BagError: the recording cannot be read or is malformed.
-        ModelError: it cannot be learned from.
+        ModelError: it cannot be learned from, or the priors cannot be used.
         BringupError: the results cannot be written.
     """
     recording = read_recording(bag, mapping)
     for note in recording.notes:
         say(f"pbrl: {note}")
     chosen = class_for(recording) if model_class == "auto" else model_class
-    asked = {} if draws is None else {"draws": draws}
+    asked: dict[str, Any] = {} if draws is None else {"draws": draws}
+    if priors is not None:
+        asked["priors"] = load_prior_options(priors)
     options = FitOptions(model_class=chosen, likelihood=likelihood, seed=seed, **asked)
     with Console(stderr=True).status(f"learning ({chosen}, {likelihood}, seed {seed})"):
         fit = fit_recording(recording, options)

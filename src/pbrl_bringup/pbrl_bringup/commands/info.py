@@ -16,11 +16,12 @@ def command(bag: Path, mapping: Path | None) -> int:
     Raises:
         BagError: it cannot be read, or something in it is malformed.
     """
-    recording = read_recording(bag, mapping)
-    episodes = cut_episodes(recording)
     if bag.suffix.lower() != ".csv":
         _print_topics(bag)
-    _print_recording(recording, episodes)
+    recording = read_recording(bag, mapping)
+    _print_recording(recording, cut_episodes(recording))
+    for note in recording.notes:
+        say(f"pbrl: {note}")
     return 0
 
 
@@ -39,8 +40,6 @@ def _print_topics(bag: Path) -> None:
     state = "" if info.finished else ", not finished"
     title = f"{bag}: {info.message_count} messages, {info.duration:.1f} s, {info.size / 1e6:.1f} MB{state}"
     output().print(table(title, ("topic", "type", "messages", "rate", "longest gap"), rows, right=(2, 3, 4)))
-    for note in info.notes:
-        say(f"pbrl: {note}")
 
 
 def _print_recording(recording: Recording, episodes: Sequence[Episode]) -> None:
