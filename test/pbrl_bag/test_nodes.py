@@ -159,6 +159,17 @@ def test_a_wrong_start_is_one_line_and_exit_code_2(graph: Graph, name: str, para
     assert words in line
 
 
+@pytest.mark.parametrize("name", ["recorder_node", "player_node"])
+def test_arguments_that_ros_cannot_read_are_no_traceback(graph: Graph, name: str) -> None:
+    process = subprocess.Popen(
+        [str(executable("pbrl_bag", name)), "--ros-args", "-p", "rate"], stderr=subprocess.PIPE, text=True
+    )
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2
+    assert "Traceback" not in errors
+    assert errors.splitlines()[-1].startswith(f"{name}: ")
+
+
 def test_what_is_played_is_byte_for_byte_what_was_recorded(graph: Graph, push_bag: Path) -> None:
     stored: dict[str, list[bytes]] = {}
     types = {}

@@ -50,7 +50,10 @@ class Table:
             raise BagError(f"{self.path}: expected at least 2 rows of numbers, got {len(self.rows)}: zero length")
         for line, row in self.rows:
             if len(row) != len(self.names):
-                raise BagError(f"{self.path}: line {line}: expected {len(self.names)} cells, got {len(row)}")
+                raise BagError(
+                    f"{self.path}: line {line}: expected {len(self.names)} cells, got {len(row)}; mend the line, or "
+                    "say in the mapping which `delimiter` is between cells"
+                )
 
     def column(self, name: str) -> Array:
         """Return a column (n,).
@@ -59,7 +62,7 @@ class Table:
             BagError: no column of that name, or a cell that is not a finite number.
         """
         if name not in self.names:
-            raise BagError(f"{self.path}: expected column {name!r}, got none; {nearest(name, self.names)}")
+            raise BagError(f"{self.path}: line 1: expected column {name!r}, got none; {nearest(name, self.names)}")
         k = self.names.index(name)
         values = np.empty(len(self.rows))
         for i, (line, row) in enumerate(self.rows):

@@ -9,6 +9,7 @@ import numpy as np
 
 from pbrl_bag.errors import BagError
 from pbrl_bag.mapping import BodySource
+from pbrl_bag.outline import fault_of_name, fault_of_outline
 from pbrl_bag.streams import read_only
 from pbrl_bag.types import Array, BodyGeometry, PoseStream
 
@@ -90,14 +91,11 @@ def _first_pose(name: str, source: BodySource, stream: PoseStream | None, where:
 
 def _check(topic: str, body: BodyGeometry) -> None:
     """Raise a BagError where geometry makes no sense."""
-    k = len(body.footprint)
-    if k < 3:
-        raise BagError(f"{topic}: body {body.name!r}: footprint: expected at least 3 corners, got {k}")
-    if not (np.isfinite(body.footprint).all() and np.isfinite(body.pose).all() and np.isfinite(body.height)):
-        raise BagError(f"{topic}: body {body.name!r}: footprint, pose and height: expected finite numbers, got NaN")
-    x, y = body.footprint.T
-    area = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-    if area <= 0.0:
-        raise BagError(
-            f"{topic}: body {body.name!r}: footprint: expected counter-clockwise corners, got an area of {area:.4g} m^2"
-        )
+    if fault := fault_of_name(body.name):
+        raise BagError(f"{topic}: bodies: {fault}")
+    if fault := fault_of_outline(body.footprint):
+        raise BagError(f"{topic}: body {body.name!r}: footprint: {fault}")
+    if not (np.isfinite(body.pose).all() and np.isfinite(body.height) and np.isfinite(body.casters).all()):
+        raise BagError(f"{topic}: body {body.name!r}: pose, height and casters: expected finite numbers, got NaN")
+    if body.nominal_mass < 0.0 or np.isinf(body.nominal_mass):
+        raise BagError(f"{topic}: body {body.name!r}: nominal_mass: expected kilograms, got {body.nominal_mass:g}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -84,7 +85,7 @@ def grasps_from_mapping(sources: Sequence[GraspSource], start: float, end: float
         end: time of its last [s].
 
     Raises:
-        BagError: a grasp lies outside the recording.
+        BagError: a grasp lies outside the recording, or one gripper holds two things at once.
     """
     grasps = []
     for source in sources:
@@ -96,7 +97,16 @@ def grasps_from_mapping(sources: Sequence[GraspSource], start: float, end: float
                 f"got {first - start:.3f} to {last - start:.3f} s"
             )
         grasps.append(_grasp(source.gripper, (source.object, *source.contact), first, last))
-    return tuple(sorted(grasps, key=lambda grasp: (grasp.start, grasp.gripper)))
+    grasps.sort(key=lambda grasp: (grasp.start, grasp.gripper))
+    for side in GRIPPERS:
+        own = [grasp for grasp in grasps if grasp.gripper == side]
+        for one, following in pairwise(own):
+            if following.start < one.end:
+                raise BagError(
+                    f"grasps: expected one object at a time in gripper {side!r}, got {one.object!r} until "
+                    f"{one.end - start:.3f} s and {following.object!r} from {following.start - start:.3f} s on"
+                )
+    return tuple(grasps)
 
 
 def _grasp(side: str, held: tuple[str, float, float], start: float, end: float) -> Grasp:

@@ -10,11 +10,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from pbrl_bag.errors import BagError
+from pbrl_bag.outline import fault_of_name, fault_of_outline
 from pbrl_bag.validation import explain
+from pbrl_bag.yaml_text import parse_yaml
 
 Column = str | float  # a column's name, or a constant
 Vector3 = tuple[float, float, float]
@@ -139,11 +140,9 @@ class BodySource(_Strict):
     casters: tuple[tuple[float, float], ...] = ()  # [m]
 
     @model_validator(mode="after")
-    def _counter_clockwise(self) -> BodySource:
-        rolled = (*self.footprint[1:], self.footprint[0])
-        area = 0.5 * sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(self.footprint, rolled, strict=True))
-        if area <= 0.0:
-            raise ValueError(f"footprint: expected counter-clockwise corners, got an area of {area:.4g} m^2")
+    def _is_an_outline(self) -> BodySource:
+        if fault := fault_of_outline(self.footprint):
+            raise ValueError(f"footprint: {fault}")
         return self
 
 
@@ -169,6 +168,9 @@ class Mapping(_Strict):
 
     @model_validator(mode="after")
     def _names_agree(self) -> Mapping:
+        for name in (*self.bodies, *self.object_poses):
+            if fault := fault_of_name(name):
+                raise ValueError(f"bodies: {fault}")
         known = {self.world, *self.frames}
         for role, source in (*self.object_poses.items(), *self.gripper_poses.items()):
             if source.frame is not None and source.frame not in known:
@@ -191,11 +193,13 @@ def load_mapping(path: Path | str) -> Mapping:
     """
     path = Path(path)
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        data = parse_yaml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BagError(f"{path}: expected a mapping file, {error.strerror or error}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise BagError(f"{path}: expected YAML, got: {error}") from error
+    except ValueError as error:
+        raise BagError(f"{path}: {error}") from error
     if not isinstance(data, dict):
         raise BagError(f"{path}: expected a mapping of keys to values, got {type(data).__name__}; see config/mappings/")
     try:

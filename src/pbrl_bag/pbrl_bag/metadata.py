@@ -11,6 +11,7 @@ import yaml
 
 from pbrl_bag.errors import BagError
 from pbrl_bag.qos import Qos, qos_from_metadata
+from pbrl_bag.yaml_text import parse_yaml
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
@@ -110,11 +111,13 @@ def read_metadata(folder: Path) -> dict[str, Any]:
     """
     path = folder / FILE_NAME
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document = parse_yaml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BagError(f"{path}: expected a bag's metadata, {error.strerror or error}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise BagError(f"{path}: expected YAML, got: {error}") from error
+    except ValueError as error:
+        raise BagError(f"{path}: {error}") from error
     information = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
     if not isinstance(information, dict):
         raise BagError(f"{path}: expected key rosbag2_bagfile_information, got none; read the .mcap file itself")
@@ -135,7 +138,10 @@ def files_of_bag(folder: Path) -> tuple[Path, ...]:
     information = read_metadata(folder)
     if (storage := information.get("storage_identifier")) != "mcap":
         raise BagError(f"{folder}: expected storage mcap, got {storage!r}; convert it with `ros2 bag convert`")
-    files = [folder / str(name) for name in information.get("relative_file_paths") or []]
+    names = information.get("relative_file_paths") or []
+    if not isinstance(names, list):
+        raise BagError(f"{folder}: {FILE_NAME}: relative_file_paths: expected a list, got {names!r}")
+    files = [folder / str(name) for name in names]
     for path in files:
         if not path.exists():
             raise BagError(f"{folder}: expected {path.name}, which {FILE_NAME} names, got no such file")

@@ -140,7 +140,8 @@ def _forward(source: str, time: Array, values: Array, notes: list[str]) -> np.nd
 def _check_jumps(source: str, time: Array, position: Array, quaternion: Array, limits: Limits) -> None:
     """Raise a BagError where the pose changes faster than `limits` allow."""
     dt = np.diff(time)
-    distance = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    with np.errstate(over="ignore"):  # of a number beyond all measure: it is a jump anyway
+        distance = np.linalg.norm(np.diff(position, axis=0), axis=1)
     _jump(source, time, distance, np.maximum(limits.speed * dt, POSITION_FLOOR), "position", "m", limits.speed)
     seen = np.flatnonzero(~np.isnan(quaternion[:, 0]))
     cosine = np.abs(np.sum(quaternion[seen][1:] * quaternion[seen][:-1], axis=1))

@@ -99,9 +99,9 @@ class PlayerNode(Node):
 
 def main() -> None:
     """Play a bag to its end, or until SIGINT or SIGTERM."""
-    stop = init_until_signal()
     node = None
     try:
+        stop = init_until_signal()
         node = PlayerNode()
         count = node.play(stop)
         if not stop.is_set():

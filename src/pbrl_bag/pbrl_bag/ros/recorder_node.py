@@ -107,9 +107,9 @@ class RecorderNode(Node):
 
 def main() -> None:
     """Record until SIGINT or SIGTERM."""
-    stop = init_until_signal()
     node = None
     try:
+        stop = init_until_signal()
         node = RecorderNode()
         spin_until(node, stop.is_set)
     except (KeyboardInterrupt, ExternalShutdownException):

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from pbrl_bag.errors import BagError
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
 WAIT = 0.1  # [s] longest wait for something to do
 
 
@@ -20,12 +25,35 @@ def init_until_signal() -> threading.Event:
     rclpy's own handlers shut the context down wherever the node happens to be; a message that has
     arrived by then can no longer be taken, one that is being published fails. Here the signal only
     asks for the end.
+
+    Raises:
+        BagError: the command line's `--ros-args` cannot be read.
     """
     stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in SIGNALS:
         signal.signal(number, lambda *_: stop.set())
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except rclpy_implementation.RCLError as error:
+        raise BagError(str(error)) from error
     return stop
+
+
+@contextlib.contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """End the block with KeyboardInterrupt at SIGINT or SIGTERM: for long work that looks at no event.
+
+    Signals belong to the main thread; in any other the block runs to its end.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, signal.default_int_handler) for number in SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def spin_until(node: Node, done: Callable[[], bool]) -> None:
