@@ -89,12 +89,36 @@ HOSTILE = [
     ("robot.pose", [9, 0, 0], r"robot\.pose: expected a start in the room"),
     ("goal.object", "tabel_a", r"goal\.object: no body 'tabel_a' in this scene; did you mean 'table_a'\?"),
     ("sensors.tags.dropout", 1.0, r"sensors\.tags\.dropout: expected less than 1, got 1\.0"),
-    ("sensors.tags.rate", 0, r"sensors\.tags\.rate: expected greater than 0, got 0"),
+    ("sensors.tags.rate", 0, r"sensors\.tags\.rate: expected greater than or equal to 0\.1, got 0"),
+    ("sensors.wrist_ft.rate", 1e-12, r"sensors\.wrist_ft\.rate: expected greater than or equal to 0\.1"),
+    ("sensors.wrist_ft.force_resolution", 1e300, r"force_resolution: expected less than or equal to 10000"),
+    ("bodies.table_a.nominal_mass", 1e308, r"bodies\.table_a\.nominal_mass: expected less than or equal to 10000"),
+    ("bodies.table_a.height", 1e12, r"bodies\.table_a\.height: expected less than or equal to 10000"),
+    ("bodies.table_a.pose", [1.0, 0.0, 1e300], r"bodies\.table_a\.pose\.2: expected less than or equal to 10000"),
+    ("room.outline", [[0, 0], [1e300, 0], [0, 1e300]], r"room\.outline\.1\.0: expected less than or equal to 10000"),
     ("sensors.wrist_ft.force_noise", [0.1, -0.1, 0.1], r"sensors\.wrist_ft\.force_noise\.1: expected greater than"),
     ("concealed.locked_casters", {"table_a": ["rear_rigth"]}, r"no caster 'rear_rigth'; did you mean 'rear_right'\?"),
     ("concealed.locked_casters", {"pillar": ["rear"]}, r"pillar: expected a body on casters, got a fixture"),
     ("concealed.mass", {"tabel_a": 3.0}, r"concealed\.mass: no body 'tabel_a' in this scene; did you mean 'table_a'"),
 ]
+
+
+@pytest.mark.parametrize("name", ["", "../table", "a table", "3rd", "tisch\u00e9"])
+def test_a_body_s_name_has_to_fit_into_a_topic(name: str) -> None:
+    plain = valid()
+    plain["bodies"][name] = {"kind": "block", "polygon": [[0, 0], [0.1, 0], [0, 0.1]], "height": 1, "nominal_mass": 1}
+    plain["bodies"][name]["pose"] = [3.0, 0.0, 0.0]
+    with pytest.raises(SimError, match="letters, digits and underscores"):
+        parse_settings(plain, Scene, "scene")
+
+
+@pytest.mark.parametrize("text", ["[" * 3000, "name: " + "9" * 5000], ids=["deep", "digits"])
+def test_what_no_yaml_reader_takes_is_one_line(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "odd.yaml"
+    file.write_text(text)
+    with pytest.raises(SimError, match="expected YAML, got") as caught:
+        load_scene(file)
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,13 @@ def last(observations: list[Observation], kind: type) -> Observation:
     return [observation for observation in observations if isinstance(observation, kind)][-1]
 
 
+@pytest.mark.parametrize("pose", [[0.1, 0.0, 0.0], [0.7, 0.0, 0.0]], ids=["on its wheels", "on its arms"])
+def test_a_body_in_the_robot_s_place_is_refused(make_scene, make_session, pose):
+    desk = make_scene().bodies["desk"].model_dump() | {"pose": pose}
+    with pytest.raises(SimError, match=r"bodies\.desk: expected a place clear of the robot"):
+        make_session(make_scene(bodies={"desk": desk}))
+
+
 def test_topics_come_at_their_rates(make_scene, make_session):
     session = make_session(make_scene(sensors={"tags": {"dropout": 0.0}}))
     count = Counter(topic for topic, _ in to_bytes(run(session, 2.0)))

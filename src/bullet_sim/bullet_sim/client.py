@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
-import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, Self
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 
 from bullet_sim.errors import SimError, nearest
 from bullet_sim.quiet import bullet, silenced
+from bullet_sim.window import BUILDERS, Window
 
 Array = NDArray[np.float64]
 
@@ -81,13 +80,15 @@ class Twist:
 
 
 class _Api:
-    """Bullet's functions bound to one client, bound once each."""
+    """Bullet's functions bound to one client, bound once each; what is built is built in its window too."""
 
-    def __init__(self, connection: int) -> None:
-        self._connection = connection
+    def __init__(self, connection: int, window: Window | None) -> None:
+        self._connection, self._window = connection, window
 
     def __getattr__(self, name: str) -> Any:
-        function = partial(getattr(bullet, name), physicsClientId=self._connection)
+        function: Callable[..., Any] = partial(getattr(bullet, name), physicsClientId=self._connection)
+        if self._window is not None and name.startswith(BUILDERS):
+            function = self._window.built_too(name, function)
         setattr(self, name, function)
         return function
 
@@ -100,27 +101,22 @@ class BulletClient:
         step_time: the physics step [s].
         time: simulated seconds since the start.
         bodies: Bullet's body numbers by name.
+        window: shows this world; None where none was asked for.
     """
 
     def __init__(self, *, step: float = STEP, gui: bool = False) -> None:
         if not (math.isfinite(step) and 1e-5 <= step <= 1 / 100):
             raise SimError(f"physics step: expected 0.00001 to 0.01 s, got {step}; leave it out for {STEP} s")
-        if gui and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-            # Bullet would end the whole process here.
-            raise SimError("Bullet: expected a display for its window, DISPLAY is not set; run without the window")
+        self.window = Window() if gui else None
         with silenced():
-            connection = bullet.connect(bullet.GUI if gui else bullet.DIRECT)
-        if connection < 0:
-            raise SimError("Bullet: expected a window to open, got no connection; run without the window")
+            connection = bullet.connect(bullet.DIRECT)
         self._connection: int | None = connection
-        self.api = _Api(connection)
+        self.api = _Api(connection, self.window)
         self.step_time = step
         self._steps = 0
         self.bodies: dict[str, int] = {}
         self._links: dict[str, dict[str, int]] = {}
         self.api.resetSimulation()
-        if gui:
-            self.api.configureDebugVisualizer(bullet.COV_ENABLE_GUI, 0)
         self.api.setGravity(0, 0, -GRAVITY)
         self.api.setPhysicsEngineParameter(
             fixedTimeStep=step,
@@ -147,11 +143,15 @@ class BulletClient:
         if self._connection is not None:
             self._connection = None
             self.api.disconnect()
+            if self.window is not None:
+                self.window.close()
 
     def step(self) -> None:
         """Advance the world by one physics step."""
         self.api.stepSimulation()
         self._steps += 1
+        if self.window is not None:
+            self.window.follow(self.api)
 
     def add(self, name: str, body: int) -> int:
         """Name a body that Bullet has made, and take the damping off it that Bullet puts on by default.

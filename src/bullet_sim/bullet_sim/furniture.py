@@ -60,8 +60,14 @@ class Furniture:
 
     def twist(self) -> Twist:
         """Give the velocity of the tag frame's origin and the angular velocity."""
+        return self.state()[1]
+
+    def state(self) -> tuple[Pose, Twist]:
+        """Give `pose` and `twist`, at little more than the price of one."""
         centre, motion = self._client.centre_pose(self.name), self._client.centre_twist(self.name)
-        return Twist(motion.linear + cross(motion.angular, centre.matrix @ self._tag), motion.angular)
+        lever = centre.matrix @ self._tag
+        pose = Pose(centre.position + lever, centre.quaternion)
+        return pose, Twist(motion.linear + cross(motion.angular, lever), motion.angular)
 
     def apply_force(self, force: Array, point: Array) -> None:
         """Push with `force` (3,) [N] at `point` (3,) [m], both in `world`, during the next step."""

@@ -103,15 +103,14 @@ class Grip:
             What acts on the object; zeros once the grasp is lost.
         """
         hand_pose, hand_twist = self._gripper_state()
-        pose, twist = self._body.pose(), self._body.twist()
-        if not self.lost:
-            self._lose_if_out(hand_pose, pose)
-        if self.lost:
-            self.load = GripLoad(np.zeros(3), np.zeros(3), hand_pose.point(self._hand), False)
-            return self.load
+        pose, twist = self._body.state()
         point = hand_pose.point(self._hand)
-        turn_back = pose.matrix.T
         stretch = pose.inverse_point(point) - self._root
+        self.lost = self.lost or self._is_out(hand_pose, pose, stretch)
+        if self.lost:
+            self.load = GripLoad(np.zeros(3), np.zeros(3), point, False)
+            return self.load
+        turn_back = pose.matrix.T
         hand_speed = hand_twist.linear + cross(hand_twist.angular, point - hand_pose.position)
         body_speed = twist.linear + cross(twist.angular, point - pose.position)
         speed = turn_back @ (hand_speed - body_speed)
@@ -136,7 +135,7 @@ class Grip:
         force = k * stretch + c * speed
         torque = self._lever2 * (k * twisted + c * spin)
         back = max(1.0, self._surface(force, torque))
-        across = float(np.clip(force[2], -2 * spec.force, 2 * spec.force))
+        across = max(-2 * spec.force, min(2 * spec.force, float(force[2])))
         return np.array([force[0] / back, force[1] / back, across]), torque / back, slipping
 
     def _surface(self, force: Array, torque: float) -> float:
@@ -153,18 +152,16 @@ class Grip:
         self._client.apply_force(robot, link, -load.force, load.point)
         api.applyExternalTorque(number, link, (-load.torque).tolist(), bullet.WORLD_FRAME)
 
-    def _lose_if_out(self, hand: Pose, body: Pose) -> None:
-        """Take note when the edge has left the plates: along them, or across."""
+    def _is_out(self, hand: Pose, body: Pose, stretch: Array) -> bool:
+        """Tell whether the edge has left the plates: across them, or, where it slips, along them."""
         spec = self._spec
-        start = body.inverse_point(hand.point(spec.along(spec.plate_start)))
-        end = body.inverse_point(hand.point(spec.along(spec.plate_end)))
-        if self.load.slipping:
-            low, high = held_interval(self._slab.outline, start, end)
-            if (high - low) * (spec.plate_end - spec.plate_start) < LAST_HOLD:
-                self.lost = True
-        across = abs(float(body.inverse_point(hand.point(self._hand))[2] - self._root[2]))
-        if across > spec.opening / 2:
-            self.lost = True
+        if abs(stretch[2]) > spec.opening / 2:
+            return True
+        if not self.load.slipping:
+            return False
+        start, end = (body.inverse_point(hand.point(spec.along(at))) for at in (spec.plate_start, spec.plate_end))
+        low, high = held_interval(self._slab.outline, start, end)
+        return (high - low) * (spec.plate_end - spec.plate_start) < LAST_HOLD
 
 
 def _wrap(angle: float) -> float:

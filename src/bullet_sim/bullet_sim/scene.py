@@ -6,6 +6,7 @@ tag is glued. Files are `config/scenes/*.yaml`; a fault in one is a `SimError` n
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -25,6 +26,8 @@ from bullet_sim.settings import (
     Vector3,
     read_settings,
 )
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 class Room(Settings):
@@ -81,7 +84,7 @@ class TagSettings(Settings):
         bias_length: distance [m] over which that error changes.
     """
 
-    rate: Annotated[float, Field(gt=0, le=200)] = 15.0
+    rate: Annotated[float, Field(ge=0.1, le=200)] = 15.0
     sigma_xy: NonNegative = 0.003
     sigma_z: NonNegative = 0.006
     sigma_yaw: NonNegative = float(np.deg2rad(0.5))
@@ -107,7 +110,7 @@ class WristSettings(Settings):
         torque_range: where the sensor saturates [N m].
     """
 
-    rate: Annotated[float, Field(gt=0, le=1000)] = 100.0
+    rate: Annotated[float, Field(ge=0.1, le=1000)] = 100.0
     force_noise: tuple[NonNegative, NonNegative, NonNegative] = (0.06, 0.11, 0.06)
     torque_noise: tuple[NonNegative, NonNegative, NonNegative] = (0.006, 0.009, 0.006)
     force_bias: NonNegative = 1.5
@@ -152,6 +155,12 @@ class Scene(Settings):
 
     @model_validator(mode="after")
     def _names_meet(self) -> Self:
+        for name in self.bodies:
+            if not NAME.fullmatch(name):
+                raise ValueError(
+                    f"bodies: expected a name of letters, digits and underscores that starts with a letter (it becomes "
+                    f"part of topics), got {name[:60]!r}"
+                )
         if self.goal is not None:
             self._known_body(self.goal.object, "goal.object")
         for effect in type(self.concealed).model_fields:

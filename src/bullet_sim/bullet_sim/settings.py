@@ -23,11 +23,13 @@ class Settings(BaseModel):
 
 Model = TypeVar("Model", bound=Settings)
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
+MOST = 1e4  # metres, kilograms, newtons: nothing in a room has more of them, and Bullet does not survive it
+Positive = Annotated[float, Field(gt=0, le=MOST)]
+NonNegative = Annotated[float, Field(ge=0, le=MOST)]
 Fraction = Annotated[float, Field(ge=0, lt=1)]
-Vector2 = tuple[float, float]
-Vector3 = tuple[float, float, float]
+Coordinate = Annotated[float, Field(ge=-MOST, le=MOST)]
+Vector2 = tuple[Coordinate, Coordinate]
+Vector3 = tuple[Coordinate, Coordinate, Coordinate]
 
 
 def _counter_clockwise(points: tuple[Vector2, ...]) -> tuple[Vector2, ...]:
@@ -74,8 +76,11 @@ def read_settings(path: Path, model: type[Model]) -> Model:
         raise SimError(f"{path}: expected a readable YAML file, got {type(error).__name__}") from error
     try:
         data = yaml.load(text, Loader=_StrictLoader)
-    except (yaml.YAMLError, TypeError) as error:
-        raise SimError(f"{path}: expected YAML, got: {' '.join(str(error).split())}") from error
+    except RecursionError as error:
+        raise SimError(f"{path}: expected YAML, got lists or mappings nested too deep") from error
+    except (yaml.YAMLError, TypeError, ValueError) as error:
+        told = " ".join(str(error).replace('in "<unicode string>", line', "at line").split())
+        raise SimError(f"{path}: expected YAML, got: {told}") from error
     return parse_settings(data, model, str(path))
 
 

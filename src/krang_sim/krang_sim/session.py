@@ -11,8 +11,10 @@ from typing import Self
 import numpy as np
 
 from bullet_sim.client import STEP, BulletClient
+from bullet_sim.errors import SimError
 from bullet_sim.scene import Posture as PostureSettings
 from bullet_sim.scene import Scene
+from bullet_sim.window import Window
 from bullet_sim.world import BodyTruth, World
 from krang_sim.commands import CommandWatchdog
 from krang_sim.grippers import GraspOutcome, Grippers, no_such_side
@@ -20,6 +22,8 @@ from krang_sim.observations import GraspState, Observation
 from krang_sim.postures import Posture, mirrored, posture
 from krang_sim.robot import BODY_JOINTS, SIDES, Krang
 from krang_sim.sensing import Sensing
+
+OVERLAP = 0.005  # [m] a body that reaches further than this into the robot stands in its place
 
 
 class KrangSession:
@@ -41,21 +45,34 @@ class KrangSession:
             step: physics step [s].
 
         Raises:
-            SimError: a scene that cannot be built, an unknown posture, a bad step.
+            SimError: a scene that cannot be built, a body where the robot stands, an unknown posture, a bad step.
         """
         world_seed, sensor_seed = np.random.SeedSequence(seed).spawn(2)
         self._client = BulletClient(step=step, gui=gui)
         try:
             self.world = World(self._client, scene, np.random.default_rng(world_seed))
             self.robot = Krang(self._client, scene.robot.pose, _start_posture(scene.robot.posture))
+            self._check_start(scene)
             self._sensing = Sensing(self.world, self.robot, np.random.default_rng(sensor_seed))
         except BaseException:
             self._client.close()
             raise
+        if self._client.window is not None:
+            self._aim(self._client.window, scene)
         self.tagged = self._sensing.tagged
         self._commands = CommandWatchdog({"base": 2, "left": 7, "right": 7, "body": 2})
         self._grippers = Grippers(self.world, self.robot)
         self._news: list[Observation] = self._sensing.latched()
+
+    def _check_start(self, scene: Scene) -> None:
+        """Raise SimError where a body of the scene reaches into the robot."""
+        for name in scene.bodies:
+            near = self._client.api.getClosestPoints(self.robot.number, self._client.bodies[name], 0.0)
+            if near and min(point[8] for point in near) < -OVERLAP:
+                raise SimError(
+                    f"bodies.{name}: expected a place clear of the robot, which stands at {list(scene.robot.pose)}; "
+                    f"got pose {list(scene.bodies[name].pose)}"
+                )
 
     def __enter__(self) -> Self:
         return self
@@ -95,6 +112,14 @@ class KrangSession:
     def release(self, side: str) -> GraspOutcome:
         """Open the gripper `side`."""
         return self._told(self._grippers.release(side))
+
+    @staticmethod
+    def _aim(window: Window, scene: Scene) -> None:
+        """Look at the whole room, over the robot's shoulder."""
+        outline = np.array(scene.room.outline)
+        low, high = outline.min(axis=0), outline.max(axis=0)
+        size = float(np.hypot(*(high - low)))
+        window.look_at((*(low + high) / 2, 0.5), 0.55 * size, scene.robot.pose[2] + 0.5, -0.8)
 
     def _told(self, outcome: GraspOutcome) -> GraspOutcome:
         if outcome.success:

@@ -13,15 +13,15 @@ from __future__ import annotations
 
 import signal
 import sys
+import threading
 import time
 from typing import Any
 
 import rclpy
 from geometry_msgs.msg import Twist
 from pbrl_msgs.srv import GraspObject, ReleaseObject
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
@@ -32,6 +32,7 @@ from bullet_sim.scene import load_scene
 from krang_sim.errors import KrangError
 from krang_sim.messages import LATCHED, message_types, to_messages
 from krang_sim.robot import SIDES
+from krang_sim.ros.parameters import declare, refuse_unknown
 from krang_sim.session import KrangSession
 
 PATIENCE = 0.1
@@ -47,22 +48,25 @@ COMMAND_QOS = QoSProfile(depth=1)
 
 
 class SimNode(Node):
-    """Steps a `KrangSession`, publishes what it gives, obeys the command topics."""
+    """Steps a `KrangSession`, publishes what it gives, obeys the command topics.
 
-    def __init__(self) -> None:
+    Args:
+        stop: when it is set, `run` returns at its next step.
+
+    Raises:
+        SimError: a wrong parameter, or a scene that cannot be built.
+    """
+
+    def __init__(self, stop: threading.Event) -> None:
         super().__init__("sim_node")
-        self._declare()
-        scene = load_scene(self._value("scene"))
-        self._rate: float = self._value("rate")
-        self._duration: float = self._value("duration")
-        self._lag: float = self._value("command_lag")
-        self.session = KrangSession(scene, seed=self._value("seed"), gui=self._value("gui"))
+        self._stop = stop
+        scene, seed, gui = self._declare()
+        self.session = KrangSession(load_scene(scene), seed=seed, gui=gui)
         types = message_types(self.session.tagged)
         self._outputs = {
             topic: self.create_publisher(kind, topic, LATCHED_QOS if topic in LATCHED else STREAM_QOS)
             for topic, kind in types.items()
         }
-        self._stopped = False
         self._heard = 0
         self._last_command: float | None = None
         self._listen_to_commands()
@@ -71,29 +75,18 @@ class SimNode(Node):
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
 
-    def _declare(self) -> None:
-        self._parameter("scene", "locked_caster", "Scene file, or the name of a scene that comes with the workspace")
-        self._parameter("seed", 0, "Seed of every random draw", IntegerRange(from_value=0, to_value=2**31 - 1))
-        self._parameter("rate", 1.0, "Simulated seconds per second; 0: as fast as possible", _between(0.0, 1000.0))
-        self._parameter("gui", False, "Open Bullet's window")
-        self._parameter("duration", 0.0, "Simulated seconds to run [s]; 0: for ever", _between(0.0, 1e6))
-        self._parameter(
-            "command_lag",
-            0.02,
-            "At a rate other than 1: simulated time [s] to run on after a command before waiting for the next",
-            _between(0.0, 1.0),
-        )
-
-    def _parameter(self, name: str, default: Any, description: str, bounds: Any = None) -> None:
-        descriptor = ParameterDescriptor(description=description, read_only=True)
-        if isinstance(bounds, FloatingPointRange):
-            descriptor.floating_point_range = [bounds]
-        elif isinstance(bounds, IntegerRange):
-            descriptor.integer_range = [bounds]
-        self.declare_parameter(name, default, descriptor)
-
-    def _value(self, name: str) -> Any:
-        return self.get_parameter(name).value
+    def _declare(self) -> tuple[str, int, bool]:
+        """Declare every parameter; return scene, seed and gui."""
+        scene = declare(self, "scene", "locked_caster", "scene file, or the name of a scene of the workspace")
+        seed = declare(self, "seed", 0, "seed of every random draw", (0, 2**31 - 1))
+        gui = declare(self, "gui", False, "open Bullet's window")
+        rate = "simulated seconds per second; 0: as fast as possible"
+        self._rate: float = declare(self, "rate", 1.0, rate, (0.0, 1000.0))
+        self._duration: float = declare(self, "duration", 0.0, "simulated seconds to run; 0: for ever", (0.0, 1e6))
+        lag = "at a rate other than 1: simulated seconds to run on after a command before waiting for the next"
+        self._lag: float = declare(self, "command_lag", 0.02, lag, (0.0, 1.0))
+        refuse_unknown(self)
+        return scene, seed, gui
 
     def _listen_to_commands(self) -> None:
         self.create_subscription(Twist, "/cmd_vel", self._command_base, COMMAND_QOS)
@@ -152,12 +145,8 @@ class SimNode(Node):
                 next_listen = self.session.time + LISTEN_PERIOD
                 origin = self._keep_pace(origin)
 
-    def stop(self) -> None:
-        """Let `run` return at its next step."""
-        self._stopped = True
-
     def _wanted(self) -> bool:
-        return not self._stopped and self.context.ok()
+        return not self._stop.is_set() and self.context.ok()
 
     def _keep_pace(self, origin: float) -> float:
         """Hear what has come, and wait until the wall clock and the controllers allow the next tick.
@@ -203,30 +192,21 @@ class SimNode(Node):
         super().destroy_node()
 
 
-def _between(low: float, high: float) -> FloatingPointRange:
-    return FloatingPointRange(from_value=low, to_value=high)
-
-
-def _stop_on_signals(node: SimNode) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: node.stop())
-
-
 def main() -> None:
     """Run the node; errors at start are one line and exit code 2."""
     node = None
     fault = ""
-    # rclpy's own handlers would shut the context down between a step and its publication.
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
     try:
-        node = SimNode()
-        _stop_on_signals(node)
+        # rclpy's own handlers would shut the context down between a step and its publication.
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        node = SimNode(stop)
         node.run()
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
-    except InvalidParameterTypeException as error:
-        fault = f"{' '.join(str(error).split())}; write floats with a point (2.0) and switches as true or false"
-    except (SimError, InvalidParameterValueException) as error:
+    except (SimError, rclpy_implementation.RCLError) as error:  # RCLError: --ros-args that cannot be read
         fault = " ".join(str(error).split())
     finally:
         if node is not None:
