@@ -64,7 +64,7 @@ class World(Node):
 @pytest.fixture
 def spin_with() -> Iterator[Callable[[type[Node]], tuple]]:
     """Give a function that makes a node and returns it, the world, and a spinner: `until(condition, act)`."""
-    context_args = ["--ros-args", "-p", "use_sim_time:=true", "-p", "exit_when_done:=true"]
+    context_args = ["--ros-args", "-p", "use_sim_time:=true", "-p", "push_node:exit_when_done:=true"]
     rclpy.init(args=context_args, domain_id=1 + os.getpid() % 100)
     executor, nodes = SingleThreadedExecutor(), []
 
@@ -125,7 +125,12 @@ def test_push_without_a_scene_fails_with_a_sentence(spin_with, push_posture: Pos
     ("module", "arguments", "complaint"),
     [
         ("push_node", ["-p", "plan:=no_such_plan"], "push plan: expected a path or one of"),
+        ("push_node", ["-p", "plan:=3"], "plan: expected str"),
+        ("push_node", ["-p", "rate:=1"], "rate: expected 10 to 200"),
+        ("push_node", ["-p", "plam:=turn_table"], "did you mean 'plan'?"),
         ("body_controller_node", ["-p", "settings:=no_such_file.yaml"], "expected a readable YAML file"),
+        ("body_controller_node", ["-p", "settings:=3"], "settings: expected str"),
+        ("body_controller_node", ["-p", "setings:=x.yaml"], "did you mean 'settings'?"),
     ],
 )
 def test_a_mistake_at_start_is_one_line_and_exit_code_2(module: str, arguments: list[str], complaint: str) -> None:

@@ -27,7 +27,7 @@ def test_the_file_that_is_installed_holds_the_defaults(root: Path) -> None:
         ("compliance: {lateral: {damping: 0}}", "compliance.lateral.damping"),
         ("[1, 2]", "expected keys and values, got list"),
         ("", "expected keys and values, got NoneType"),
-        ("a: [1", "expected YAML, got text that is not at line"),
+        ("a: [1", "got '<stream end>' at line 1"),
     ],
 )
 def test_a_hostile_file_is_refused_in_one_line(text: str, complaint: str) -> None:

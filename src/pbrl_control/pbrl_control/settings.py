@@ -6,9 +6,9 @@ import difflib
 from pathlib import Path
 from typing import Annotated, TypeVar
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from pbrl_bag.yaml_text import parse_yaml
 from pbrl_control.errors import ControlError
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -107,11 +107,9 @@ def load_section(path: Path, model: type[Model], what: str) -> Model:
 def parse_section(text: str, model: type[Model], where: str) -> Model:
     """Read YAML text into a section; raise ControlError that starts with `where`."""
     try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = f" at line {mark.line + 1}" if mark else ""
-        raise ControlError(f"{where}: expected YAML, got text that is not{place}; mend it there") from error
+        content = parse_yaml(text)
+    except ValueError as error:
+        raise ControlError(f"{where}: {error}") from error
     if not isinstance(content, dict):
         raise ControlError(f"{where}: expected keys and values, got {type(content).__name__}")
     try:

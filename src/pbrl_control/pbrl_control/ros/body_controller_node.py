@@ -14,12 +14,13 @@ import rclpy
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, WrenchStamped
 from pbrl_msgs.msg import Grasps, Scene
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
+from pbrl_bag.errors import BagError
+from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.stopping import init_until_signal, spin_until
 from pbrl_control.controller import BodyController
 from pbrl_control.errors import ControlError
@@ -47,10 +48,8 @@ class BodyControllerNode(Node):
 
     def __init__(self) -> None:
         super().__init__("body_controller_node")
-        described = ParameterDescriptor(
-            description="YAML of gains and limits; empty: body_controller.yaml as installed"
-        )
-        path = self.declare_parameter("settings", "", described).value
+        path = declare(self, "settings", "", "YAML of gains and limits; empty: body_controller.yaml as installed")
+        refuse_unknown(self)
         self._settings = load_section(Path(path) if path else _installed_settings(), ControllerSettings, "settings")
         self._controller: BodyController | None = None
         self._watchdog = Watchdog(self._settings.timeout)
@@ -157,12 +156,12 @@ def _installed_settings() -> Path:
 
 def main() -> None:
     """Run the node until it is told to stop."""
-    stop = init_until_signal()
     node = None
     try:
+        stop = init_until_signal()
         node = BodyControllerNode()
         spin_until(node, stop.is_set)
-    except ControlError as error:
+    except (ControlError, BagError) as error:
         print(f"body_controller_node: {error}", file=sys.stderr)
         sys.exit(2)
     except (KeyboardInterrupt, ExternalShutdownException):

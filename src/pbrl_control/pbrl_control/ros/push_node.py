@@ -9,13 +9,14 @@ import rclpy
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from pbrl_msgs.msg import Grasps, Scene
 from pbrl_msgs.srv import GraspObject, ReleaseObject
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.client import Client
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
 
+from pbrl_bag.errors import BagError
+from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.stopping import init_until_signal, spin_until
 from pbrl_control.errors import ControlError
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag
@@ -35,11 +36,11 @@ class PushNode(Node):
 
     def __init__(self) -> None:
         super().__init__("push_node")
-        plan = self._parameter("plan", "turn_table", "name of a plan in config/params/pushes, or a path")
-        self._exit = self._parameter("exit_when_done", False, "end with exit code 0 when done, 1 when failed")
-        span = FloatingPointRange(from_value=10.0, to_value=200.0)
-        rate = self._parameter("rate", 50.0, "ticks a second, on the node's clock [Hz]", [span])
-        self._executive = PushExecutive(load_plan(str(plan)))
+        plan = declare(self, "plan", "turn_table", "name of a plan in config/params/pushes, or a path")
+        self._exit = declare(self, "exit_when_done", False, "end with exit code 0 when done, 1 when failed")
+        rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (10.0, 200.0))
+        refuse_unknown(self)
+        self._executive = PushExecutive(load_plan(plan))
         self.ended: Future = Future()
         self._tags: dict[str, Tag] = {}
         self._wrenches: dict[str, Array] = {}
@@ -53,11 +54,7 @@ class PushNode(Node):
             "grasp": self.create_client(GraspObject, "/grasp"),
             "release": self.create_client(ReleaseObject, "/release"),
         }
-        self.create_timer(1.0 / float(rate), self._tick)
-
-    def _parameter(self, name: str, default: object, description: str, span: list[FloatingPointRange] | None = None):
-        described = ParameterDescriptor(description=description, floating_point_range=span or [])
-        return self.declare_parameter(name, default, described).value
+        self.create_timer(1.0 / rate, self._tick)
 
     def _subscribe(self) -> None:
         plan = self._executive.plan
@@ -128,9 +125,9 @@ class PushNode(Node):
 
 def main() -> None:
     """Run the node; with `exit_when_done`, end with 0 when the push is done and 1 when it failed."""
-    stop = init_until_signal()
     node, code = None, 0
     try:
+        stop = init_until_signal()
         node = PushNode()
         spin_until(node, lambda: stop.is_set() or node.ended.done())
         if node.ended.done():
@@ -138,7 +135,7 @@ def main() -> None:
             code = int(command.phase == Phase.FAILED)
             if code:
                 print(f"push_node: {command.status}", file=sys.stderr)
-    except ControlError as error:
+    except (ControlError, BagError) as error:
         print(f"push_node: {error}", file=sys.stderr)
         code = 2
     except (KeyboardInterrupt, ExternalShutdownException):
