@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from pbrl_model.errors import ModelError
 from pbrl_model.fit import FitOptions, fit_recording, motions_of
 from pbrl_model.parameters import BodyParameters, free_columns
 from pbrl_model.predict import path_error, predict, predict_windows, unlearned
+from pbrl_model.verdicts import note_on_left_out
 from pbrl_model.windows import whole_windows
 
 Maker = Callable[..., Recording]
@@ -71,6 +73,21 @@ def test_same_seed_same_bytes(recording: Recording) -> None:
     first, second, other = (fit_recording(recording, FitOptions(seed=seed, **QUICK)) for seed in (3, 3, 4))
     draws = [fit.objects["table"].posterior.draws.tobytes() for fit in (first, second, other)]
     assert draws[0] == draws[1] != draws[2]
+
+
+def test_one_thread_makes_the_same_bytes_as_all(recording: Recording) -> None:
+    everything = numba.get_num_threads()
+    fits = []
+    for threads in (1, everything):
+        numba.set_num_threads(threads)
+        fits.append(fit_recording(recording, FitOptions(**QUICK)).objects["table"].posterior.draws.tobytes())
+    assert fits[0] == fits[1]
+
+
+def test_a_force_that_the_model_does_not_have_is_said() -> None:
+    assert note_on_left_out(np.full((4, 10, 2), 2.9), 1.0) == ()
+    (note,) = note_on_left_out(np.full((4, 10, 2), 12.0), 1.0)
+    assert "about 12 N" in note
 
 
 @pytest.mark.parametrize("likelihood", ["one_step", "integrated"])

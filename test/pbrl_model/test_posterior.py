@@ -10,7 +10,7 @@ from pbrl_model.errors import ModelError
 from pbrl_model.parameters import BodyParameters, expand, free_columns
 from pbrl_model.posterior import Posterior
 from pbrl_model.rollout import rollout
-from pbrl_model.symmetry import canonical_wheel, circular_mean, circular_sd, equivalent_wheels, wrap
+from pbrl_model.symmetry import canonical_wheel, circular_mean, circular_sd, equivalent_wheels, wheel_features, wrap
 
 NAMES = free_columns("wheel")
 BASE = BodyParameters(1.0)
@@ -48,6 +48,21 @@ def test_equivalent_wheels_move_alike_and_have_one_representative() -> None:
 def test_draws_without_a_whole_wheel_stay_as_they_are() -> None:
     draws = np.random.default_rng(0).normal(size=(3, 4, 6))
     np.testing.assert_array_equal(canonical_wheel(draws, free_columns("hinge")), draws)
+
+
+def test_wheel_features_are_the_same_for_the_same_wheel_and_only_for_it() -> None:
+    draws = wheels(3)
+    features = wheel_features(draws, NAMES)
+    for same in equivalent_wheels(draws, NAMES):
+        np.testing.assert_allclose(wheel_features(same, NAMES), features, atol=1e-12)
+    turned = draws.copy()
+    turned[:, NAMES.index("wheel_theta")] += 0.5
+    assert np.all(np.abs(wheel_features(turned, NAMES) - features).max(axis=1) > 1e-4)
+    turned[:, NAMES.index("mu_x")] = turned[:, NAMES.index("mu_y")]
+    twice = turned.copy()
+    twice[:, NAMES.index("wheel_theta")] += 1.0
+    np.testing.assert_allclose(wheel_features(twice, NAMES), wheel_features(turned, NAMES), atol=1e-12)
+    np.testing.assert_array_equal(wheel_features(draws[:, :1], NAMES[:1]), draws[:, :1])
 
 
 def test_summary_does_not_depend_on_which_of_the_equivalent_wheels_was_drawn() -> None:

@@ -86,6 +86,7 @@ BAD = {
     "flat": ({"parameters": ROW}, "shape"),
     "mass": ({"parameters": changed(mass=0.0)}, "mass=0"),
     "mu": ({"parameters": changed(mu_x=-0.1)}, "mu >= 0"),
+    "mu_ground": ({"parameters": changed(mu_ground=-0.01)}, "mu_ground=-0.01"),
     "nan": ({"parameters": changed(wheel_theta=float("nan"))}, "wheel_theta=nan"),
     "radius": ({"parameters": changed(hinge_radius=-1.0)}, "hinge_radius"),
     "infinite": ({"parameters": changed(hinge_radius=float("inf"))}, "hinge_radius=inf"),

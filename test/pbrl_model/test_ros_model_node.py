@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -173,7 +174,17 @@ def test_hears_while_it_fits(graph: Graph, monkeypatch: pytest.MonkeyPatch) -> N
     assert future.result().success
 
 
-@pytest.mark.parametrize("argument", ["priors:=no/such/priors.yaml", "max_draws:=0"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_fit(graph: Graph, monkeypatch: pytest.MonkeyPatch, number: signal.Signals) -> None:
+    monkeypatch.setattr(model_node, "fit_recording", lambda *_: os.kill(os.getpid(), number) or pytest.fail("went on"))
+    monkeypatch.setattr(graph.node.listener, "recording", lambda: RECORDING)
+    with pytest.raises(KeyboardInterrupt):
+        graph.node._learn(LearnModel.Request(), LearnModel.Response())
+
+
+@pytest.mark.parametrize(
+    "argument", ["priors:=no/such/priors.yaml", "max_draws:=0", "max_draws:=many", "max_drows:=10"]
+)
 def test_errors_at_start_are_one_line_and_exit_code_two(argument: str) -> None:
     command = [sys.executable, "-m", "pbrl_model.ros.model_node", "--ros-args", "-p", argument]
     domain = {"ROS_DOMAIN_ID": str(1 + (os.getpid() + 9) % 200), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}

@@ -18,6 +18,7 @@ from pbrl_model.polish import polish
 from pbrl_model.priors import table2_prior
 from pbrl_model.sensing import Motion, observe
 from pbrl_model.starts import SearchPlan, distinct, find_modes
+from pbrl_model.symmetry import wheel_features
 from pbrl_model.target import Target
 from pbrl_model.windows import shooting_windows
 
@@ -127,6 +128,27 @@ def test_modes_are_the_wheel_that_is_there(pushed: tuple[Target, Motion]) -> Non
     assert np.all(np.diff(modes.point.log_density) <= 0.0)
     again = find_modes(np.random.default_rng(0), target, [motion], SMALL)
     assert modes.point.position.tobytes() == again.point.position.tobytes()
+
+
+def test_modes_are_different_wheels_not_descriptions_of_one(pushed: tuple[Target, Motion]) -> None:
+    target, motion = pushed
+    modes = find_modes(np.random.default_rng(0), target, [motion], SMALL)
+    features = wheel_features(modes.point.position[:, :6], target.names)
+    spread = wheel_features(target.prior.sample(np.random.default_rng(1), 2000), target.names).std(axis=0)
+    for row in range(1, len(features)):
+        assert np.all(np.any(np.abs(features[:row] - features[row]) > 0.1 * spread, axis=1))
+
+
+def test_noise_of_a_mode_is_at_its_best(pushed: tuple[Target, Motion]) -> None:
+    target, _ = pushed
+    start = np.array([[33.0, -0.65, 0.3, 0.0, 0.2, 0.2, 0.7, 1.5]])
+    point = polish(target, start, np.array([15.0, 0.4, 0.2, 1.8, 0.25, 0.25]), iterations=3).point
+    for column in (6, 7):
+        for step in (-0.03, 0.03):
+            moved = point.position.copy()
+            moved[:, column] += step
+            value = target.log_prior(moved) + target.log_likelihood(moved, point.residuals, point.linear)
+            assert value[0] < point.log_density[0]
 
 
 def test_distinct_keeps_the_best_of_each_place() -> None:

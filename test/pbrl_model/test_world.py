@@ -86,6 +86,8 @@ def test_same_input_gives_the_same_bytes() -> None:
 BAD = {
     "mass": {"parameters": BodyParameters(-1.0)},
     "nan": {"parameters": BodyParameters(1.0, wheel_x=float("nan"))},
+    "nan beside a hinge": {"parameters": BodyParameters(float("nan"), hinge_radius=0.1)},
+    "mu_ground": {"parameters": BodyParameters(1.0, mu_ground=-0.01)},
     "radius": {"parameters": BodyParameters(1.0, hinge_radius=-0.1)},
     "infinite": {"parameters": BodyParameters(1.0, hinge_radius=float("inf"))},
     "pose": {"pose": np.array([0.0, np.nan, 0.0])},

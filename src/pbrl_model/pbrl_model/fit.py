@@ -29,7 +29,7 @@ from pbrl_model.sensing import Motion, observe
 from pbrl_model.starts import SearchPlan, find_modes
 from pbrl_model.symmetry import wrap
 from pbrl_model.target import LEFT_OUT_BESIDE_GROUND, LEFT_OUT_FORCE, FrozenTarget, Target
-from pbrl_model.verdicts import notes_on
+from pbrl_model.verdicts import note_on_left_out, notes_on
 
 __all__ = ["Fit", "FitOptions", "ObjectFit", "fit_recording", "motions_of"]
 
@@ -129,7 +129,7 @@ def motions_of(recording: Recording, name: str, options: FitOptions | None = Non
     """Return the episodes of one object on one clock.
 
     Raises:
-        ModelError: a stream is missing or broken, or every episode is too short.
+        ModelError: a stream is missing or broken, every episode is too short, or the pose never changes.
         BagError: an episode is malformed.
     """
     chosen = options or FitOptions()
@@ -139,6 +139,9 @@ def motions_of(recording: Recording, name: str, options: FitOptions | None = Non
     if not usable:
         longest = max((episode.duration for episode in episodes), default=0.0)
         raise ModelError(f"{name}: expected an episode of at least {SHORTEST} s, got at most {longest:.3f} s")
+    seen = [np.nan_to_num(np.hstack([each.poses.position, each.poses.quaternion])) for each in usable]
+    if all((poses == poses[:1]).all() for poses in seen):
+        raise ModelError(f"{name}: expected poses that change while it is held, got the same one all the time")
     return tuple(
         observe(recording, name, episode.grippers, episode.start, episode.end, com, gravity=chosen.gravity)
         for episode in usable
@@ -192,6 +195,8 @@ def _fit_object(rng: np.random.Generator, recording: Recording, name: str, optio
     if heldout is not None:
         posterior = replace(posterior, heldout_rmse=heldout.after.rmse_position)
     notes = notes_on(posterior, target.prior, motions, rng)
+    if likelihood.with_drag:
+        notes += note_on_left_out(noise, target.left_out_force)
     return ObjectFit(posterior, noise, chains.acceptance, heldout, notes, motions, body)
 
 

@@ -50,8 +50,8 @@ class FitOptions(BaseModel):
     window: Annotated[float, Field(ge=0.2, le=60.0)] = 1.5
     draws: Annotated[int, Field(ge=1, le=1_000_000)] = 500
     chains: Annotated[int, Field(ge=1, le=256)] = 4
-    burn_in: Annotated[int, Field(ge=0, le=1_000_000)] = 600
-    thin: Annotated[int, Field(ge=1, le=10_000)] = 4
+    burn_in: Annotated[int, Field(ge=0, le=1_000_000)] = 1000
+    thin: Annotated[int, Field(ge=1, le=10_000)] = 8
     search_draws: Annotated[int, Field(ge=10, le=1_000_000)] = 600
     seed: Annotated[int, Field(ge=0)] = 0
     holdout_share: Annotated[float, Field(ge=0.0, le=0.5)] = 0.1

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,11 @@ class Linearisation:
 
     nuisance: Array
     sensitivities: Array
+
+    @cached_property
+    def gram(self) -> Array:
+        """Return S^T S of every row and window, (P, W, 9, 9): a sampler asks for it thousands of times."""
+        return np.swapaxes(self.sensitivities, -1, -2) @ self.sensitivities
 
     def take(self, rows: NDArray[np.int64]) -> Linearisation:
         """Return that of some of the rows."""
@@ -190,8 +196,7 @@ class WindowedLikelihood:
             return constant - 0.5 * np.sum(squares / variance + self._count * np.log(variance), axis=-1)
         offset = self._centred(residuals, linear)
         scale = self._scale(drag)
-        gram = np.swapaxes(linear.sensitivities, -1, -2) @ linear.sensitivities
-        inner = gram * (scale[:, None, :, None] * scale[:, None, None, :])
+        inner = linear.gram * (scale[:, None, :, None] * scale[:, None, None, :])
         inner = inner + variance[..., None, None] * np.eye(NUISANCES)
         projected = (np.swapaxes(linear.sensitivities, -1, -2) @ offset[..., None])[..., 0] * scale[:, None, :]
         factor = np.linalg.cholesky(inner)

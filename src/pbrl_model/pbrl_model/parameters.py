@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from types import MappingProxyType
 
 import numpy as np
@@ -109,11 +109,11 @@ class BodyParameters:
 
     def to_vector(self) -> Array:
         """Return the (12,) row of `KERNEL_COLUMNS`."""
-        return np.array(list(asdict(self).values()), dtype=float)
+        return np.array([getattr(self, name) for name in KERNEL_COLUMNS], dtype=float)
 
     @classmethod
     def from_vector(cls, vector: Array) -> BodyParameters:
-        """Make parameters from an (12,) row of `KERNEL_COLUMNS`."""
+        """Make parameters from a (12,) row of `KERNEL_COLUMNS`."""
         values = np.asarray(vector, dtype=float)
         if values.shape != (len(KERNEL_COLUMNS),):
             raise ModelError(f"parameters: expected a row of {len(KERNEL_COLUMNS)} columns, got shape {values.shape}")

@@ -64,6 +64,7 @@ def polish(target: Target, starts: Array, spread: Array, *, iterations: int) -> 
                 break
             continue
         point = _fit_noise(target, target.settle(moved), rounds=2)
+    point = _fit_noise(target, point, rounds=8)  # above only as closely as the climb needs
     curvature, _ = _slopes(target, point, spread)
     return Modes(point, _covariance(target, point, curvature))
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from pbrl_bag.yaml_text import parse_yaml
 from pbrl_model.distributions import Distribution, LogNormal, TruncatedNormal, Uniform, VonMises
 from pbrl_model.errors import ModelError
 from pbrl_model.parameters import KERNEL_COLUMNS, nearest
@@ -160,9 +160,11 @@ def load_prior_options(path: Path) -> PriorOptions:
         ModelError: the file cannot be read, a key is unknown or a value is out of range.
     """
     try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        values = parse_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
         raise ModelError(f"{path}: expected readable YAML, got {' '.join(str(error).split())}") from None
+    except ValueError as error:
+        raise ModelError(f"{path}: {error}") from None
     return parse_prior_options(values, str(path))
 
 

@@ -133,6 +133,7 @@ def _parameter_rows(parameters: ArrayLike) -> Array:
         & (rows[:, kernel.MASS] > 0.0)
         & (rows[:, kernel.MU_X] >= 0.0)
         & (rows[:, kernel.MU_Y] >= 0.0)
+        & (rows[:, kernel.MU_GROUND] >= 0.0)
         & ~(radius < 0.0)
     )
     if not legal.all():

@@ -17,6 +17,7 @@ from pbrl_model.guesses import guesses
 from pbrl_model.likelihood import WindowedLikelihood
 from pbrl_model.polish import Modes, polish
 from pbrl_model.sensing import Motion
+from pbrl_model.symmetry import wheel_features
 from pbrl_model.target import Target
 from pbrl_model.windows import shooting_windows
 
@@ -25,7 +26,7 @@ Array = NDArray[np.float64]
 FIRST_NOISE = (np.log(2.0), np.log(4.0))
 """ln sigma and ln drag while draws are compared: generous, for none of them is right yet."""
 DISTINCT = 0.15
-"""Positions nearer than this share of the prior's spread in every parameter are one."""
+"""Positions nearer than this share of the prior's spread in every feature are one."""
 
 
 @dataclass(frozen=True)
@@ -49,20 +50,20 @@ class SearchPlan:
             raise ModelError(f"search: expected {len(self.lengths) + 1} stages' `keep` and `iterations`, got {self}")
 
 
-def distinct(position: Array, value: Array, spread: Array, count: int) -> NDArray[np.int64]:
+def distinct(features: Array, value: Array, spread: Array, count: int) -> NDArray[np.int64]:
     """Return the rows of the best positions that differ from one another.
 
     Args:
-        position: (n, D), learned parameters first.
+        features: (n, K) of the positions, see `wheel_features`: four descriptions of one wheel are one.
         value: (n,) log densities.
-        spread: (K,) scale of each learned parameter.
+        spread: (K,) scale of each feature.
         count: at most so many.
     """
     kept: list[int] = []
     for row in np.argsort(-value, kind="stable"):
         if not np.isfinite(value[row]) or len(kept) == count:
             break
-        scaled = np.abs(position[kept, : len(spread)] - position[row, : len(spread)]) / spread
+        scaled = np.abs(features[kept] - features[row]) / spread
         if not kept or np.all(np.any(scaled > DISTINCT, axis=1)):
             kept.append(int(row))
     return np.array(kept, dtype=np.int64)
@@ -86,6 +87,11 @@ def find_modes(rng: np.random.Generator, target: Target, motions: Sequence[Motio
     names, body = target.names, target.likelihood.body
     draws = target.prior.sample(rng, plan.draws)
     spread = np.maximum(draws.std(axis=0), 1e-9)
+    apart = np.maximum(wheel_features(draws, names).std(axis=0), 1e-9)
+
+    def best(found: Array, value: Array, count: int) -> NDArray[np.int64]:
+        return distinct(wheel_features(found[:, : len(names)], names), value, apart, count)
+
     informed = guesses(names, motions, body.com, target.prior.sample(rng, max(plan.draws // 20, 8)))
     physics = np.concatenate([draws, _inside(target, informed)])
     position = np.concatenate([physics, np.tile(FIRST_NOISE, (len(physics), 1))], -1)
@@ -94,14 +100,14 @@ def find_modes(rng: np.random.Generator, target: Target, motions: Sequence[Motio
         windows = shooting_windows(motions, length)
         stage = target.over(WindowedLikelihood(body, windows, with_drag=target.likelihood.with_drag))
         if first:
-            rows = distinct(position, stage.full_log_density(position), spread, keep)
+            rows = best(position, stage.full_log_density(position), keep)
             if len(rows) == 0:
                 raise ModelError("search: expected a draw of the prior with finite density, got none; check the priors")
             position, first = position[rows], False
         modes = polish(stage, position, spread, iterations=iterations)
-        position = modes.point.position[distinct(modes.point.position, modes.point.log_density, spread, keep)]
+        position = modes.point.position[best(modes.point.position, modes.point.log_density, keep)]
     modes = polish(target, position[: plan.keep[-1]], spread, iterations=plan.iterations[-1])
-    return modes.take(distinct(modes.point.position, modes.point.log_density, spread, len(position)))
+    return modes.take(best(modes.point.position, modes.point.log_density, len(position)))
 
 
 def _inside(target: Target, physics: Array) -> Array:

@@ -48,6 +48,23 @@ def equivalent_wheels(draws: Array, names: Sequence[str]) -> Array:
     return turned
 
 
+def wheel_features(draws: Array, names: Sequence[str]) -> Array:
+    """Return draws (..., K) with wheel_theta, mu_x and mu_y replaced by numbers that are the same for the same wheel.
+
+    The friction coefficient in direction a is, up to its shape in between, m + d cos(2 (a - theta)) with the mean m and
+    half the difference d of the two; m, d cos(2 theta) and d sin(2 theta) are the same in all four descriptions, and a
+    wheel that holds alike in every direction has no turn.
+    """
+    out = np.array(draws, dtype=float)
+    if not all(name in names for name in WHEEL_NAMES):
+        return out
+    theta, mu_x, mu_y = (list(names).index(name) for name in WHEEL_NAMES)
+    half = (draws[..., mu_x] - draws[..., mu_y]) / 2.0
+    out[..., theta] = (draws[..., mu_x] + draws[..., mu_y]) / 2.0
+    out[..., mu_x], out[..., mu_y] = half * np.cos(2.0 * draws[..., theta]), half * np.sin(2.0 * draws[..., theta])
+    return out
+
+
 def wrap(angle: Array, period: float) -> Array:
     """Bring angles [rad] into (-period / 2, period / 2]."""
     return angle - period * np.ceil(angle / period - 0.5)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrl_model.diagnostics import convergence
 from pbrl_model.parameters import ANGLES
@@ -13,11 +14,33 @@ from pbrl_model.priors import Prior
 from pbrl_model.sensing import Motion
 from pbrl_model.symmetry import canonical_wheel
 
+Array = NDArray[np.float64]
+
 LEARNED_SHARE = 0.6
 """A posterior wider than this share of its prior has learned nothing worth a number."""
 DISAGREE = 1.1
 """Split R-hat above which chains tell different things."""
 PRIOR_DRAWS = 2000
+MISSING = 3.0
+"""A left-out force this many times its most likely size is a thing that the model class does not have."""
+
+
+def note_on_left_out(noise: Array, usual: float) -> tuple[str, ...]:
+    """Return a sentence where the model had to leave out far more force than such models do; none otherwise.
+
+    A caster that is dragged while the push presses the table on it is the usual case: its friction follows its load.
+
+    Args:
+        noise: (..., 2) draws of sigma and left-out force [N].
+        usual: most likely left-out force [N].
+    """
+    force = float(np.median(noise[..., 1]))
+    if force < MISSING * usual:
+        return ()
+    return (
+        f"something that this model class does not have acts with about {force:.0f} N: the numbers are less sure than "
+        "their spreads say",
+    )
 
 
 def notes_on(

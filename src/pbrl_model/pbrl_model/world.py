@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pymunk
@@ -240,10 +240,10 @@ def _distance_joint(
 
 
 def _check_spec(spec: BodySpec) -> None:
-    parameters = spec.parameters.to_vector()
-    radius = spec.parameters.hinge_radius
-    legal = np.isfinite(parameters).sum() >= parameters.size - 1 and not math.isinf(radius)
-    if not legal or spec.parameters.mass <= 0.0 or min(spec.parameters.mu_x, spec.parameters.mu_y) < 0.0:
+    told = spec.parameters
+    # Where there is no hinge its radius is NaN; nothing else may be.
+    legal = np.isfinite((told if told.has_hinge else replace(told, hinge_radius=0.0)).to_vector()).all()
+    if not legal or told.mass <= 0.0 or min(told.mu_x, told.mu_y, told.mu_ground) < 0.0:
         raise ModelError(
             f"world: expected finite parameters with mass > 0 and mu >= 0 for {spec.name!r}, got {spec.parameters}"
         )

@@ -12,10 +12,8 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from pbrl_msgs.msg import ObjectModels
 from pbrl_msgs.srv import LearnModel
-from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -23,7 +21,8 @@ from visualization_msgs.msg import MarkerArray
 
 from pbrl_bag import read_recording
 from pbrl_bag.errors import BagError
-from pbrl_bag.ros.stopping import init_until_signal, spin_until
+from pbrl_bag.ros.parameters import declare, refuse_unknown
+from pbrl_bag.ros.stopping import ended_by_signals, init_until_signal, spin_until
 from pbrl_bag.types import Recording
 from pbrl_model.errors import ModelError
 from pbrl_model.fit import FitOptions, fit_recording
@@ -41,17 +40,16 @@ class ModelNode(Node):
     """Offers `/learn`; publishes `/object_models` and `/object_models/markers`.
 
     Raises:
+        BagError: a wrong parameter.
         ModelError: the file of priors is not usable.
     """
 
     def __init__(self, context: Context | None = None, **options: Any):
         super().__init__("model_node", context=context, **options)
-        self._max_draws: int = self._declare(
-            "max_draws", 1000, "draws published for each object", IntegerRange(from_value=1, to_value=100_000, step=1)
-        )
-        priors: str = self._declare(
-            "priors", "", "YAML file of priors, as config/params/priors.yaml; empty: its defaults"
-        )
+        draws = "draws published for each object"
+        self._max_draws: int = declare(self, "max_draws", 1000, draws, (1, 100_000))
+        priors = declare(self, "priors", "", "YAML file of priors, as config/params/priors.yaml; empty: its defaults")
+        refuse_unknown(self)
         self._priors = load_prior_options(Path(priors)) if priors else PriorOptions()
         self._posteriors: dict[str, Posterior] = {}
         self._models = self.create_publisher(ObjectModels, "/object_models", LATCHED)
@@ -61,18 +59,12 @@ class ModelNode(Node):
         self.create_service(LearnModel, "/learn", self._learn)
         self.create_timer(MARKER_SECONDS, self._draw, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def _declare(self, name: str, default: Any, text: str, bounds: IntegerRange | None = None) -> Any:
-        """Declare a parameter and return its value."""
-        descriptor = ParameterDescriptor(
-            description=text, read_only=True, integer_range=[] if bounds is None else [bounds]
-        )
-        return self.declare_parameter(name, default, descriptor).value
-
     def _learn(self, request: LearnModel.Request, response: LearnModel.Response) -> LearnModel.Response:
         """Fit, publish and answer; what goes wrong is the answer's message."""
         try:
-            recording = read_recording(Path(request.recording)) if request.recording else self.listener.recording()
-            learned = self._fit(recording, request)
+            with ended_by_signals():  # a fit takes longer than one waits for a node to end
+                recording = read_recording(Path(request.recording)) if request.recording else self.listener.recording()
+                learned = self._fit(recording, request)
         except (BagError, ModelError) as error:
             response.message = " ".join(str(error).split())
             self.get_logger().warning(f"/learn: {response.message}")
@@ -138,13 +130,13 @@ def main() -> None:
     """Run the node; errors at start are one line and exit code 2."""
     node = None
     fault = ""
-    stop = init_until_signal()
     try:
+        stop = init_until_signal()
         node = ModelNode()
         spin_until(node, stop.is_set)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
-    except (ModelError, InvalidParameterTypeException, InvalidParameterValueException) as error:
+    except (BagError, ModelError) as error:
         fault = " ".join(str(error).split())
     finally:
         if node is not None:
