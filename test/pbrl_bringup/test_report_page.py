@@ -11,7 +11,7 @@ import pytest
 from pydantic import ValidationError
 
 from pbrl_bringup.debian import ensure_program
-from pbrl_bringup.report_data import Parameter, Report
+from pbrl_bringup.report_data import Hinge, Parameter, Report
 from pbrl_bringup.report_page import number, render_page, rounded, write_page
 
 FLAGS = (
@@ -80,7 +80,38 @@ def test_a_mean_has_the_digits_of_its_spread() -> None:
     assert rounded(31.24, 1.9) == "31.2"
 
 
+def hinged(report: Report) -> Report:
+    """The report of a door whose heading was not recorded."""
+    part = report.objects[0]
+    flat = [(x, y, 0.0) for x, y, _ in part.episodes[0].recorded]
+    episode = part.episodes[0].model_copy(update={"recorded": flat, "wrench": [(1.0, 2.0, 0.0)] * len(flat)})
+    hinge = Hinge(
+        draws=[(0.5, 0.4, 0.3), (0.51, 0.4, 0.31)], mean=(0.505, 0.4, 0.305), ellipse=[(0.5, 0.4), (0.51, 0.4)]
+    )
+    door = part.model_copy(update={"wheel": None, "truth": None, "hinge": hinge, "episodes": [episode]})
+    return report.model_copy(update={"objects": [door]})
+
+
+def test_of_a_door_the_hinge_is_drawn_and_no_turn_that_nobody_saw(report: Report, tmp_path: Path) -> None:
+    dom = drawn_page(hinged(report), tmp_path)
+    assert "hinge, radius 30.5 cm" in dom
+    assert "turns here" in dom
+    assert ">turned<" not in dom
+    assert "it has turned by" not in dom.split("<script")[0]
+    assert dom.count('class="after trail"') == 2, "the circle about the hinge, in both pictures"
+
+
 def test_the_page_draws_in_a_browser_without_complaint(report: Report, tmp_path: Path) -> None:
+    dom = drawn_page(report, tmp_path)
+    drawn = re.findall(r'<path class="([a-z ]+)" d="(M[^"]+)"', dom)
+    assert {"recorded body", "before", "after", "draw", "cursor", "ellipse", "truthmark"} <= {kind for kind, _ in drawn}
+    assert not [data for _, data in drawn if "NaN" in data or "Infinity" in data]
+    assert 'class="dot"' in dom
+    assert "prediction before learning off by" in dom
+
+
+def drawn_page(report: Report, tmp_path: Path) -> str:
+    """Open a page in a browser, which must not complain; return what its scripts made of it."""
     page = tmp_path / "report.html"
     write_page(report, page)
     browser = ensure_program("chromium", "chromium", "the test of the report page")
@@ -89,9 +120,4 @@ def test_the_page_draws_in_a_browser_without_complaint(report: Report, tmp_path:
         [browser, *FLAGS, profile, "--dump-dom", page.as_uri()], capture_output=True, text=True, timeout=120, check=True
     )
     assert "CONSOLE" not in result.stderr
-    dom = result.stdout
-    drawn = re.findall(r'<path class="([a-z ]+)" d="(M[^"]+)"', dom)
-    assert {"recorded body", "before", "after", "draw", "cursor", "ellipse", "truthmark"} <= {kind for kind, _ in drawn}
-    assert not [data for _, data in drawn if "NaN" in data or "Infinity" in data]
-    assert 'class="dot"' in dom
-    assert "prediction before learning off by" in dom
+    return result.stdout

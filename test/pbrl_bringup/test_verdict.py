@@ -54,6 +54,21 @@ def test_no_friction_means_nothing_holds_it() -> None:
     assert "rolls freely" in wheel_verdict("cart", wheel_draws(0.5, 0.3, 0.2, mu=0.005), TABLE, CASTERS)
 
 
+def test_a_wheel_of_no_certain_place_is_not_called_a_stuck_caster() -> None:
+    """What a free table's posterior looks like: it rolls along, and the place is as wide as the table."""
+    draws = wheel_draws(-0.35, 0.1, 0.3) | {"mu_x": np.full(400, 0.003)}
+    text = wheel_verdict("table", draws, TABLE, CASTERS)
+    assert text.startswith("Nothing holds the table in place: it rolls") and "stuck" not in text
+    held = wheel_verdict("table", wheel_draws(-0.35, 0.1, 0.3, mu=0.2), TABLE, CASTERS)
+    assert "does not say where" in held and "stuck" not in held
+
+
+def test_a_wheel_that_rolls_one_way_is_not_stuck() -> None:
+    draws = wheel_draws(-0.51, 0.3, 0.01) | {"mu_x": np.full(400, 0.003)}
+    text = wheel_verdict("table", draws, TABLE, CASTERS)
+    assert "at its rear-left caster: a wheel there rolls and does not swivel" in text and "stuck" not in text
+
+
 def test_a_hinge_has_a_radius() -> None:
     radius = np.array([0.299, 0.301])
     assert (

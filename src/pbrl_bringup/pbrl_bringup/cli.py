@@ -29,10 +29,11 @@ USER_ERRORS = {
     "pbrl_bringup.errors": "BringupError",
 }
 
+STOPPED = 130  # what Ctrl-C ends with; typer itself turns it into this code
+
 app = typer.Typer(
     name="pbrl",
     help="A robot pushes things whose physics it does not know, and learns a model of each from the recording.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -143,7 +144,7 @@ def run(
 @app.command(epilog="Example: ./pbrl record --out out/push.bag")
 def record(
     out: Annotated[Path, typer.Option(help="Bag folder to make; it must not exist yet.")],
-    duration: Annotated[float, typer.Option(min=0, help="Seconds to record; 0: until Ctrl-C.")] = 0.0,
+    duration: Annotated[float, typer.Option(min=0, max=1e9, help="Seconds to record; 0: until Ctrl-C.")] = 0.0,
     domain: Domain = None,
 ) -> int:
     """Record the contract's topics of a running graph or robot."""
@@ -153,7 +154,7 @@ def record(
 @app.command(epilog="Example: ./pbrl play out/push.bag --rate 2")
 def play(
     bag: Annotated[Path, typer.Argument(help="Bag folder or .mcap file.")],
-    rate: Annotated[float, typer.Option(min=0.01, help="Times faster than it was recorded.")] = 1.0,
+    rate: Annotated[float, typer.Option(min=0.01, max=1000, help="Times faster than it was recorded.")] = 1.0,
     domain: Domain = None,
 ) -> int:
     """Publish a recording again."""
@@ -188,11 +189,12 @@ def main() -> None:
 def run_arguments(arguments: Sequence[str]) -> int:
     """Run one command and return its exit code; every error ends here, as one line on stderr."""
     try:
-        return int(app(args=list(arguments), prog_name="pbrl", standalone_mode=False) or 0)
+        code = int(app(args=list(arguments) or ["--help"], prog_name="pbrl", standalone_mode=False) or 0)
+        return _complain("stopped", STOPPED) if code == STOPPED else code
     except TyperException as error:
         return _complain(" ".join(error.format_message().split()) or "see --help", 2)
     except KeyboardInterrupt:
-        return _complain("stopped", 130)
+        return _complain("stopped", STOPPED)
     except Exception as error:
         if _is_for_the_user(error):
             return _complain(" ".join(str(error).split()), 2)

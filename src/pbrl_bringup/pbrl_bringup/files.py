@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -63,11 +63,26 @@ def whole_folder(path: Path) -> Iterator[Path]:
 
 
 def refuse_existing(path: Path) -> None:
-    """Raise BringupError where `path` holds something that would be overwritten."""
-    if path.is_dir() and not any(path.iterdir()):
-        return
-    if path.exists():
+    """Raise BringupError where `path` holds something that would be overwritten, or cannot be a name."""
+    try:
+        if path.is_dir() and not any(path.iterdir()) and path.name:
+            return
+        taken = path.exists()
+    except OSError as error:
+        raise BringupError(f"{_short(path)}: cannot be made: {error.strerror}; choose another --out") from error
+    if taken:
         raise BringupError(f"{path}: expected a name that is free, but it exists; choose another --out or remove it")
+
+
+def new_folder_place(path: Path) -> None:
+    """Make the folder in which `path` is to be made, and see that it can be.
+
+    Raises:
+        BringupError: something is there, or no folder can be made in this place.
+    """
+    refuse_existing(path)
+    with result_folder(path.parent, keep=True):
+        _try_writing(path.parent, path)
 
 
 def output_folder(path: Path) -> Path:
@@ -79,8 +94,52 @@ def output_folder(path: Path) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BringupError(f"{path}: expected a folder for results: {error.strerror}; choose another --out") from error
+        raise _no_folder(path, error) from error
+    _try_writing(path, path)
     return path
+
+
+@contextmanager
+def result_folder(path: Path, *, keep: bool = False) -> Iterator[Path]:
+    """Make the folder for results before the work begins; where the work fails, what was made for it goes again.
+
+    Args:
+        path: the folder.
+        keep: leave it there even if the block fails.
+
+    Raises:
+        BringupError: it is a file, or cannot be made or written to.
+    """
+    try:
+        made = [folder for folder in (path, *path.parents) if not folder.exists()]
+    except OSError as error:
+        raise _no_folder(path, error) from error
+    try:
+        yield output_folder(path)
+    except BaseException:
+        for folder in [] if keep else made:
+            with suppress(OSError):
+                folder.rmdir()  # only if it is empty
+        raise
+
+
+def _try_writing(folder: Path, meant: Path) -> None:
+    """Raise BringupError where nothing can be made in a folder."""
+    probe = folder / f".pbrl.{os.getpid()}.part"
+    try:
+        probe.mkdir()
+        probe.rmdir()
+    except OSError as error:
+        raise _no_folder(meant, error) from error
+
+
+def _no_folder(path: Path, error: OSError) -> BringupError:
+    return BringupError(f"{_short(path)}: expected a folder for results: {error.strerror}; choose another --out")
+
+
+def _short(path: Path) -> str:
+    text = str(path)
+    return text if len(text) <= 120 else f"{text[:117]}..."
 
 
 def _beside(path: Path) -> Path:

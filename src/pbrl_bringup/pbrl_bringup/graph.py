@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-import yaml
 from pydantic import Field
 
 from bullet_sim.settings import Settings, read_settings
+from pbrl_bag.yaml_text import parse_yaml
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.paths import config_file, node_executable
 from pbrl_bringup.processes import Programs
@@ -75,7 +75,7 @@ def with_parameters(graph: Graph, settings: Mapping[str, str], optional: tuple[s
         optional: names of the optional nodes to start.
 
     Raises:
-        BringupError: there is no node of a name that is used.
+        BringupError: there is no node of a name that is used, or a value is none that a parameter can have.
     """
     unknown = sorted({key.partition(".")[0] for key in settings} | set(optional) - set(graph.nodes))
     unknown = [name for name in unknown if name not in graph.nodes]
@@ -83,12 +83,21 @@ def with_parameters(graph: Graph, settings: Mapping[str, str], optional: tuple[s
         raise BringupError(f"the graph has no node {unknown[0]!r}; its nodes are {', '.join(graph.nodes)}")
     nodes = {}
     for name, node in graph.nodes.items():
-        own = {
-            key.partition(".")[2]: yaml.safe_load(text) for key, text in settings.items() if key.startswith(f"{name}.")
-        }
+        own = {key.partition(".")[2]: _value(key, text) for key, text in settings.items() if key.startswith(f"{name}.")}
         if not node.optional or name in optional or own:
             nodes[name] = node.model_copy(update={"parameters": {**node.parameters, **own}})
     return graph.model_copy(update={"nodes": nodes})
+
+
+def _value(key: str, text: str) -> Scalar:
+    """Return the value of a parameter that is written as YAML."""
+    try:
+        value = parse_yaml(text)
+    except ValueError as error:
+        raise BringupError(f"{key}={text}: {error}") from error
+    if not isinstance(value, bool | int | float | str | list):
+        raise BringupError(f"{key}={text}: expected a boolean, number, text or list, got {value!r}")
+    return value
 
 
 def node_command(name: str, node: Node) -> list[str]:

@@ -47,13 +47,19 @@ class Programs:
     Args:
         logs: folder for one log file a program.
         environment: of the programs; None for the parent's own.
+
+    Raises:
+        BringupError: the folder cannot be made.
     """
 
     def __init__(self, logs: Path, environment: Mapping[str, str] | None = None) -> None:
         self._logs = logs
         self._environment = dict(os.environ if environment is None else environment)
         self._running: dict[str, Program] = {}
-        logs.mkdir(parents=True, exist_ok=True)
+        try:
+            logs.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise BringupError(f"{logs}: expected a folder for logs: {error.strerror}; choose another") from error
 
     def __enter__(self) -> Self:
         return self
@@ -119,11 +125,16 @@ class Programs:
         _stop_together(programs)
 
 
+def die_with_parent() -> None:
+    """Have the kernel kill this process when the one that started it ends."""
+    _LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
 def _die_with(parent: int) -> Callable[[], None]:
     """Return what a child does before it becomes the program: tie its life to its parent's."""
 
     def prepare() -> None:
-        _LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        die_with_parent()
         if os.getppid() != parent:  # the parent died before the tie was made
             os._exit(1)
         # A shell ignores SIGINT for what it starts in the background, and children inherit that.

@@ -29,6 +29,7 @@ from pbrl_bringup.report_data import (
 )
 from pbrl_bringup.verdict import (
     ahead_verdict,
+    circle_verdict,
     free_verdict,
     hinge_verdict,
     learning_verdict,
@@ -61,6 +62,11 @@ MEANINGS = {
     "anchor_x": "hinge arm on the body, x",
     "anchor_y": "hinge arm on the body, y",
 }
+HINGED = {  # what has another meaning where a hinge leads the body
+    "mass": "mass, as felt where it was held",
+    "mu_x": "friction of the hinge, felt where it was held, as a share of the weight: along x",
+    "mu_y": "the same along y",
+}
 
 
 def object_report(
@@ -86,16 +92,17 @@ def object_report(
     starts = sorted({float(replay.time[0]) for replay in replays})
     episodes = [_episode(starts.index(float(replay.time[0])) + 1, replay, rng) for replay in replays]
     wheel = _wheel(canonical, rng) if "wheel_x" in canonical.names else None
+    hinge = _hinge(canonical, rng) if "hinge_x" in canonical.names else None
     return ObjectReport(
         name=geometry.name,
         verdict=_verdict(geometry, canonical),
-        detail=_detail(replays, episodes),
+        detail=_detail(replays, episodes, hinge),
         model_class=canonical.model_class,
         footprint=_points(geometry.footprint),
         casters=_points(geometry.casters),
         parameters=_parameters(geometry, canonical, rng),
         wheel=wheel,
-        hinge=_hinge(canonical, rng) if "hinge_x" in canonical.names else None,
+        hinge=hinge,
         episodes=episodes,
         heldout=None if heldout is None else _heldout(heldout),
         truth=None if locked is None else _truth(wheel, locked),
@@ -148,12 +155,17 @@ def _verdict(geometry: BodyGeometry, posterior: Posterior) -> str:
     return free_verdict(name, draws)
 
 
-def _detail(replays: Sequence[Replay], episodes: Sequence[Episode]) -> str:
+def _detail(replays: Sequence[Replay], episodes: Sequence[Episode], hinge: Hinge | None) -> str:
     whole = [number for number, each in enumerate(replays) if each.restart is None]
     if not whole:
         return ""
     last = episodes[whole[-1]]
     text = learning_verdict(last.end_before, last.end_after, last.time[-1], fitted=last.fitted)
+    if hinge is not None:
+        x, y, radius = hinge.mean
+        places = np.array([pose[:2] for number in whole for pose in episodes[number].recorded])
+        off = np.abs(np.hypot(*(places - [x, y]).T) - radius)
+        text = f"{circle_verdict(float(off.max()))} {text}"
     ahead = [each for each in episodes if each.restart is not None]
     return f"{text} {ahead_verdict(ahead[-1].restart, ahead[-1].end_before, ahead[-1].end_after)}" if ahead else text
 
@@ -218,10 +230,11 @@ def _parameters(geometry: BodyGeometry, posterior: Posterior, rng: np.random.Gen
     prior = table2_prior(geometry, posterior.model_class)
     ranges = np.quantile(prior.sample(rng, 4000), [0.05, 0.95], axis=0).T
     believed = dict(zip(prior.names, ranges, strict=True))
+    meanings = MEANINGS | HINGED if posterior.model_class == "hinge" else MEANINGS
     return [
         Parameter(
             name=name,
-            meaning=MEANINGS.get(name, ""),
+            meaning=meanings.get(name, ""),
             mean=float(mean),
             sd=float(sd),
             unit=unit,

@@ -65,7 +65,7 @@ def centimetres(value: float | None) -> str:
     if value is None:
         return "unknown"
     if value >= 1:
-        return f"{value:.1f}\N{NO-BREAK SPACE}m"
+        return f"{value:.{0 if value >= 10 else 1}f}\N{NO-BREAK SPACE}m"
     return f"{100 * value:.{0 if value >= 0.1 else 1}f}\N{NO-BREAK SPACE}cm"
 
 
@@ -91,7 +91,7 @@ def tiles(part: ObjectReport) -> list[Tile]:
     if part.hinge:
         spread = next((p.sd for p in part.parameters if p.name == "hinge_radius"), None)
         radius = centimetres(part.hinge.mean[2])
-        found.append(Tile("Distance from hinge to handle", radius, f"standard deviation {centimetres(spread)}"))
+        found.append(Tile("From the hinge to where it was held", radius, f"standard deviation {centimetres(spread)}"))
     if part.truth and part.truth.distance is not None:
         note = "the simulator was asked after the fit"
         found.append(Tile("From the caster that was really locked", centimetres(part.truth.distance), note))

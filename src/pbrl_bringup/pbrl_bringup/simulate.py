@@ -7,6 +7,7 @@ plan and seed make the same bag, byte for byte.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import singledispatchmethod
@@ -29,7 +30,7 @@ from krang_sim.observations import (
 from krang_sim.session import KrangSession
 from pbrl_bag.writer import BagWriter
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.files import refuse_existing
+from pbrl_bringup.files import new_folder_place
 from pbrl_bringup.paths import config_file
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
 from pbrl_control.loop import ControlLoop, LoopCommand
@@ -82,13 +83,13 @@ def simulate_push(
         advance: called now and then with the simulated time [s] and the phase.
 
     Raises:
-        BringupError: `bag` exists, or the push did not end.
+        BringupError: `bag` exists or cannot be made, the plan's object is not in the scene, or the push did not end.
         SimError: the scene cannot be built.
         ControlError: the plan does not fit the robot.
     """
-    refuse_existing(bag)
+    _check_fit(scene, plan)
+    new_folder_place(bag)
     unfinished = bag.with_name(f".{bag.name}.part")
-    bag.parent.mkdir(parents=True, exist_ok=True)
     settings = load_section(config_file("params", "body_controller"), ControllerSettings, "settings")
     with KrangSession(scene, seed=seed, gui=gui) as session:
         # The name inside the bag is the folder's, so the folder is made under its own name elsewhere.
@@ -104,6 +105,16 @@ def simulate_push(
                 unfinished.rmdir()
             raise
         return SimulatedPush(bag, str(end.phase), end.status, session.time, writer.message_count)
+
+
+def _check_fit(scene: Scene, plan: PushPlan) -> None:
+    """Raise BringupError where a plan is about something else than what stands in the scene."""
+    if plan.object not in scene.bodies:
+        near = difflib.get_close_matches(plan.object, scene.bodies, 1)
+        advice = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(scene.bodies) or 'none'}"
+        raise BringupError(f"push {plan.name}: scene {scene.name} has no object {plan.object!r}; {advice}")
+    if plan.push_time > LONGEST:
+        raise BringupError(f"push {plan.name}: expected at most {LONGEST:.0f} s of segments, got {plan.push_time:g} s")
 
 
 def _run(run: _Run, advance: Callable[[float, str], None]) -> PushCommand:

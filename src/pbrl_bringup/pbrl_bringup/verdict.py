@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 
 NEAR = 0.06  # [m] a place this close to a caster is called by the caster's name
 FREE_FRICTION = 0.02  # a wheel whose friction is below this in nearly all draws does not hold anything
-LOPSIDED = 4.0  # friction across the wheel this many times the friction along it: it rolls one way
+HOLDING_FRICTION = 0.04  # in its weaker direction a stuck wheel has more than the rolling resistance of good casters
+UNPLACED = 0.2  # [m] a place known no better than this is no place
 
 
 def spoken(name: str) -> str:
@@ -53,16 +54,34 @@ def wheel_verdict(name: str, draws: Mapping[str, Array], footprint: Array, caste
     points = np.column_stack([draws["wheel_x"], draws["wheel_y"]])
     mean = points.mean(axis=0)
     radius = spread_radius(points)
+    if radius > UNPLACED:
+        return _unplaced(name, radius, rolls=rolls_along(draws))
     distances = np.hypot(*(casters - mean).T) if len(casters) else np.array([np.inf])
     nearest = int(distances.argmin())
-    if distances[nearest] < max(NEAR, radius):
-        where = place_name(casters[nearest], footprint)
-        gap = _length(distances[nearest])
+    at_caster = distances[nearest] < max(NEAR, radius)
+    where = place_name(casters[nearest] if at_caster else mean, footprint)
+    gap, middle = _length(distances[nearest]), _length(math.hypot(*mean))
+    if rolls_along(draws):
+        place = f"{where} caster" if at_caster else where
+        text = (
+            f"Nothing holds the {name} in place, but it resists going sideways at its {place}: "
+            "a wheel there rolls and does not swivel"
+        )
+    elif at_caster:
         text = f"The {name}’s {where} caster is stuck: the {name} turns about a point {gap} from it"
     else:
-        where = place_name(mean, footprint)
-        text = f"Something holds the {name} to the floor at its {where}, {_length(math.hypot(*mean))} from the middle"
+        text = f"Something holds the {name} to the floor at its {where}, {middle} from the middle"
     return f"{text} (known to ± {_length(radius)})."
+
+
+def _unplaced(name: str, radius: float, *, rolls: bool) -> str:
+    """Say what is known of a wheel that has no certain place."""
+    if rolls:
+        return (
+            f"Nothing holds the {name} in place: it rolls, and what resists its going sideways has no certain place "
+            f"(± {_length(radius)})."
+        )
+    return f"Something holds the {name} to the floor, but this recording does not say where (± {_length(radius)})."
 
 
 def holds_nothing(draws: Mapping[str, Array]) -> bool:
@@ -72,12 +91,11 @@ def holds_nothing(draws: Mapping[str, Array]) -> bool:
     return bool(np.quantile(np.maximum(draws["mu_x"], draws["mu_y"]), 0.95) < FREE_FRICTION)
 
 
-def rolls_one_way(draws: Mapping[str, Array]) -> bool:
-    """Tell whether the wheel holds across its direction but rolls along it."""
+def rolls_along(draws: Mapping[str, Array]) -> bool:
+    """Tell whether the wheel rolls one way, as one that is free or only does not swivel, and a stuck one does not."""
     if "mu_x" not in draws or "mu_y" not in draws:
         return False
-    low, high = sorted([float(np.median(draws["mu_x"])), float(np.median(draws["mu_y"]))])
-    return high > LOPSIDED * max(low, 1e-6)
+    return bool(np.median(np.minimum(draws["mu_x"], draws["mu_y"])) < HOLDING_FRICTION)
 
 
 def hinge_verdict(name: str, draws: Mapping[str, Array]) -> str:
@@ -86,6 +104,11 @@ def hinge_verdict(name: str, draws: Mapping[str, Array]) -> str:
     return (
         f"The {name} turns on a hinge {_length(radius.mean())} from where it was held (± {_length(2 * radius.std())})."
     )
+
+
+def circle_verdict(worst: float) -> str:
+    """Say how far the recorded path leaves the circle about the hinge at most [m]."""
+    return f"All of the recorded path lies within {_length(worst)} of the circle about it."
 
 
 def free_verdict(name: str, draws: Mapping[str, Array]) -> str:
@@ -135,5 +158,5 @@ def spread_radius(points: Array) -> float:
 
 def _length(metres: float) -> str:
     if metres >= 1:
-        return f"{metres:.2f} m"
+        return f"{metres:.{0 if metres >= 10 else 2}f} m"
     return f"{100 * metres:.0f} cm" if metres >= 0.1 else f"{100 * metres:.1f} cm"

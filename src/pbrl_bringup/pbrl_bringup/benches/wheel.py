@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
+import sys
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bullet_sim.catalogue import OfficeTable
 from bullet_sim.scene import Scene, load_scene
+from krang_sim.session import KrangSession
 from pbrl_bag import read_recording
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.errors import BringupError
+from pbrl_bringup.processes import die_with_parent
 from pbrl_bringup.simulate import simulate_push
 from pbrl_bringup.terminal import progress
 from pbrl_control.push_plan import PushPlan, Segment, load_plan
 from pbrl_model.fit import FitOptions, ObjectFit, fit_recording, motions_of
 from pbrl_model.predict import path_error, predict_windows, unlearned
 from pbrl_model.windows import whole_windows
+
+Array = NDArray[np.float64]
 
 SEEDS, QUICK_SEEDS = 10, 2
 WORKERS = 2
@@ -39,6 +46,7 @@ class Trial:
     Attributes:
         seed: of simulation and fit.
         distance: from the posterior mean of the wheel to the locked caster's axis [m].
+        contact: from there to where the locked caster's wheel touches the floor, up to its trail off the axis [m].
         position_before: error of the held-out push's final position without learning [m].
         position_after: the same, learned.
         yaw_before: error of its final heading [rad].
@@ -48,6 +56,7 @@ class Trial:
 
     seed: int
     distance: float
+    contact: float
     position_before: float
     position_after: float
     yaw_before: float
@@ -74,13 +83,28 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
 
 def _in_parallel(seeds: Iterable[int], out: Path) -> list[Trial]:
     numbers = list(seeds)
-    with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool, progress("seeds", len(numbers)) as bar:
-        jobs = [pool.submit(run_trial, number, out) for number in numbers]
-        trials: list[Trial] = []
-        for job in as_completed(jobs):
-            trials.append(job.result())
-            bar(len(trials))
+    trials: list[Trial] = []
+    with (
+        ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn"), initializer=_obey_the_parent) as pool,
+        progress("seeds", len(numbers)) as bar,
+    ):
+        try:
+            for job in as_completed([pool.submit(run_trial, number, out) for number in numbers]):
+                trials.append(job.result())
+                bar(len(trials))
+        except BaseException:  # Ctrl-C among them: nobody waits for what is half done
+            pool.shutdown(wait=False, cancel_futures=True)
+            for child in active_children():
+                child.terminate()
+            raise
     return trials
+
+
+def _obey_the_parent() -> None:
+    """Leave Ctrl-C, which the terminal sends to all, to the parent; let its SIGTERM unwind the stack."""
+    die_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
 
 
 def rows_of(trials: list[Trial]) -> list[Row]:
@@ -96,6 +120,8 @@ def rows_of(trials: list[Trial]) -> list[Row]:
             int(np.ceil(0.9 * len(trials))),
             worst_m=max(trial.distance for trial in trials),
             median_m=float(np.median([trial.distance for trial in trials])),
+            worst_to_contact_m=max(trial.contact for trial in trials),
+            median_to_contact_m=float(np.median([trial.contact for trial in trials])),
         ),
         at_most(
             "held-out push: final position error over the unlearned model's",
@@ -126,7 +152,8 @@ def run_trial(seed: int, out: Path) -> Trial:
     found = fit.objects[plan.object]
     errors = heldout_errors(found, predicted_in)
     distance = distance_to_locked(scene, found)
-    return Trial(seed, distance, *errors, fit.seconds)
+    contact = float(np.hypot(*(locked_contacts(scene, plan.object, seed) - wheel_of(found)).T).min())
+    return Trial(seed, distance, contact, *errors, fit.seconds)
 
 
 def other_profile(plan: PushPlan) -> PushPlan:
@@ -155,10 +182,30 @@ def distance_to_locked(scene: Scene, found: ObjectFit) -> float:
     table = scene.bodies[name]
     if not isinstance(table, OfficeTable):
         raise BringupError(f"{name}: expected an office table, got {type(table).__name__}")
-    canonical = found.posterior.canonical()
-    mean = np.array([canonical.column(column).mean() for column in ("wheel_x", "wheel_y")])
     places = np.array([table.swivels[caster] for caster in scene.concealed.locked_casters[name]])
-    return float(np.hypot(*(places - mean).T).min())
+    return float(np.hypot(*(places - wheel_of(found)).T).min())
+
+
+def wheel_of(found: ObjectFit) -> Array:
+    """Return the posterior mean of the wheel's place (2,) [m] in the body's frame."""
+    canonical = found.posterior.canonical()
+    return np.array([canonical.column(column).mean() for column in ("wheel_x", "wheel_y")])
+
+
+def locked_contacts(scene: Scene, name: str, seed: int) -> Array:
+    """Return where a table's locked casters touch the floor (k, 2) [m] in its frame; scoring only.
+
+    A locked caster keeps the angle at which it was left, which the world's seed draws: the world of the
+    session that was recorded is built once more.
+    """
+    with KrangSession(scene, seed=seed) as session:
+        table = session.world.find(name)
+        if table.casters is None:
+            raise BringupError(f"{name}: expected a body on casters, got one without")
+        pose = table.pose()
+        touching = [pose.inverse_point(point)[:2] for point in table.casters.contacts()]
+        locked = [caster.locked for caster in table.casters.links]
+    return np.array(touching)[locked]
 
 
 def heldout_errors(found: ObjectFit, bag: Path) -> tuple[float, float, float, float]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pbrl_bringup.benches.rows import last_line, report
 from pbrl_bringup.errors import BringupError
+from pbrl_bringup.files import output_folder
 from pbrl_bringup.terminal import output, say, table
 
 BENCHES = {
@@ -30,6 +31,7 @@ def command(name: str, out: Path | None, seed: int, quick: bool) -> int:
         advice = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(BENCHES)}"
         raise BringupError(f"bench {name!r} is not known; {advice}")
     folder = out or Path("out/bench") / name
+    output_folder(folder)
     say(f"pbrl: bench {name}: {BENCHES[name]}; seed {seed}, results in {folder}")
     module = import_module(f"pbrl_bringup.benches.{name}")
     summary = report(name, seed, module.measure, quick, folder)

@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from pbrl_bag import Recording, read_recording
-from pbrl_bringup.files import output_folder, write_json
+from pbrl_bringup.files import result_folder, write_json
 from pbrl_bringup.replay import replay
 from pbrl_bringup.report_build import object_report, whole_report
 from pbrl_bringup.report_data import Report
@@ -47,16 +47,16 @@ def command(
     if priors is not None:
         asked["priors"] = load_prior_options(priors)
     options = FitOptions(model_class=chosen, likelihood=likelihood, seed=seed, **asked)
-    with Console(stderr=True).status(f"learning ({chosen}, {likelihood}, seed {seed})"):
-        fit = fit_recording(recording, options)
-    report = fit_report(recording, fit, seed, "./pbrl " + shlex.join(sys.argv[1:]))
-    folder = output_folder(out)
-    for name, found in fit.objects.items():
-        save_posterior(found.posterior, folder / f"posterior_{name}.nc")
-    write_json(folder / "report.json", fit.to_report())
-    write_page(report, folder / "report.html")
+    with result_folder(out) as folder:
+        with Console(stderr=True).status(f"learning ({chosen}, {likelihood}, seed {seed})"):
+            fit = fit_recording(recording, options)
+        report = fit_report(recording, fit, seed, "./pbrl " + shlex.join(sys.argv[1:]))
+        for name, found in fit.objects.items():
+            save_posterior(found.posterior, folder / f"posterior_{name}.nc")
+        write_json(folder / "report.json", fit.to_report())
+        write_page(report, folder / "report.html")
     print_fit(fit, report)
-    output().print(f"[bold]{folder / 'report.html'}[/]")
+    output().print(f"[bold]{out / 'report.html'}[/]")
     return 0
 
 

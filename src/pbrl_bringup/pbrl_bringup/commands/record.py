@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.files import refuse_existing
+from pbrl_bringup.files import new_folder_place
 from pbrl_bringup.graph import Node, node_command, outside_environment
 from pbrl_bringup.processes import Programs
 from pbrl_bringup.terminal import say
@@ -19,9 +19,9 @@ def command(out: Path, duration: float, domain: int | None) -> int:
     """Record every topic of the environment's graph.
 
     Raises:
-        BringupError: `out` exists, or the recorder failed.
+        BringupError: `out` exists or cannot be made, or the recorder failed.
     """
-    refuse_existing(out)
+    new_folder_place(out)
     node = Node(package="pbrl_bag", executable="recorder_node", parameters={"output": str(out)})
     with tempfile.TemporaryDirectory() as logs, Programs(Path(logs), outside_environment(domain)) as programs:
         recorder = programs.start("recorder", node_command("recorder", node))

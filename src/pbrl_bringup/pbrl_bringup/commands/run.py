@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from pbrl_bringup.graph import load_graph, parse_setting, running_graph, wait_ready, with_parameters
+from pbrl_bringup.graph import load_graph, node_command, parse_setting, running_graph, wait_ready, with_parameters
 from pbrl_bringup.ros.client import GraphClient
 from pbrl_bringup.terminal import say
 
@@ -18,6 +18,8 @@ def command(graph: str, settings: Sequence[str], optional: Sequence[str], domain
         BringupError: no such graph, node or parameter; a node that ends by itself.
     """
     chosen = with_parameters(load_graph(graph), dict(map(parse_setting, settings)), tuple(optional))
+    for name, node in chosen.nodes.items():
+        node_command(name, node)  # errors before a word is said
     number = int(os.environ.get("ROS_DOMAIN_ID", "0")) if domain is None else domain
     say(f"pbrl: {chosen.description.strip()}")
     with running_graph(chosen, logs, number) as programs, GraphClient(number, programs.check) as client:

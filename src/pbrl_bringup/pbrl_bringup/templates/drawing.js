@@ -63,6 +63,7 @@ function niceStep(span, count) {
 }
 
 function length(metres) {
+  if (metres >= 10) return metres.toFixed(0) + " m";
   if (metres >= 1) return trim(metres.toFixed(1)) + " m";
   return metres >= 0.01 ? trim((metres * 100).toFixed(1)) + " cm" : trim((metres * 1000).toFixed(1)) + " mm";
 }

@@ -24,6 +24,7 @@ function makePlayer(section) {
     if (before !== null) parts.push(`before learning off by <span class="before">${length(before)}</span>`);
     if (after !== null) parts.push(`after learning by <span class="after">${length(after)}</span>`);
     if (!parts.length) return "";
+    if (!headingSeen(episode)) return `At this moment: prediction ${parts.join(", ")}.`;
     const [start, here] = [episode.recorded[0][2], poseAt(episode.recorded, index)[2]];
     const turned = (Math.atan2(Math.sin(here - start), Math.cos(here - start)) * 180) / Math.PI;
     const way = Math.abs(turned) < 0.5 ? "" : turned > 0 ? " to the left" : " to the right";

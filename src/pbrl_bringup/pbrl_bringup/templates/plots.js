@@ -73,9 +73,15 @@ function timeAxis(svg, X, end, bottom) {
   element(svg, "text", { x: X(end), y: bottom + 31, "text-anchor": "end" }, "seconds since the push began");
 }
 
+// Whether anything told the heading: an angle that never moves by the least bit was not recorded.
+function headingSeen(episode) {
+  return episode.recorded.some((pose) => pose[2] !== episode.recorded[0][2]);
+}
+
 function drawMotion(parent, episode) {
   parent.replaceChildren();
   const columns = [["to the right, x", "m", 0, 1], ["away, y", "m", 1, 1], ["turned", "degrees", 2, 180 / Math.PI]];
+  if (!headingSeen(episode)) columns.pop();
   return columns.map(([title, unit, k, factor], row) => {
     // Angles are shown from where the push began, each unwound along its own path.
     const start = k === 2 ? episode.recorded[0][2] : 0;
@@ -83,13 +89,14 @@ function drawMotion(parent, episode) {
     const series = [{ values: column(episode.recorded), kind: "recorded" }];
     if (episode.before.length) series.push({ values: column(episode.before), kind: "before" });
     if (episode.after.length) series.push({ values: column(episode.after), kind: "after" });
-    return drawPlot(parent, title, unit, episode.time, series, envelope(episode.draws.map(column)), row === 2);
+    return drawPlot(parent, title, unit, episode.time, series, envelope(episode.draws.map(column)), row === columns.length - 1);
   });
 }
 
 function drawEffort(parent, episode) {
   parent.replaceChildren();
   const columns = [["force to the right", "newton", 0], ["force away", "newton", 1], ["turning moment about its middle", "newton metre", 2]];
+  if (episode.wrench.every((w) => w[2] === 0)) columns.pop();
   return columns.map(([title, unit, k], row) =>
-    drawPlot(parent, title, unit, episode.time, [{ values: episode.wrench.map((w) => w[k]), kind: "effortline" }], null, row === 2));
+    drawPlot(parent, title, unit, episode.time, [{ values: episode.wrench.map((w) => w[k]), kind: "effortline" }], null, row === columns.length - 1));
 }

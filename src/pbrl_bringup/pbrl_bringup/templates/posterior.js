@@ -67,14 +67,15 @@ function drawZoom(svg, object) {
 
 function drawHinge(svg, object) {
   const width = 400, height = 400, hinge = object.hinge;
-  const body = object.episodes.flatMap((e) => e.recorded);
+  const paths = object.episodes.filter((e) => !e.restart).map((e) => e.recorded);
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  const view = mapping(bounds([...body, ...hinge.ellipse]), width, height, 46);
-  element(svg, "path", { class: "recorded", d: path(body.map(view.map)) });
+  const view = mapping(bounds([...paths.flat(), ...hinge.ellipse]), width, height, 58);
+  for (const points of paths) element(svg, "path", { class: "recorded", d: path(points.map(view.map)) });
   const [x, y] = view.map(hinge.mean);
   element(svg, "circle", { class: "after trail", cx: x, cy: y, r: hinge.mean[2] * view.scale, "stroke-dasharray": "3 5" });
   cloud(svg, view, hinge, 1.8);
-  element(svg, "text", { class: "aftertext halo", x: x + 10, y: y + 20 }, `hinge, radius ${length(hinge.mean[2])}`);
-  element(svg, "text", { class: "halo", x: 12, y: 20 }, "the room, seen from above; black: recorded path");
+  const side = x < width / 2 ? { x: Math.max(x - 8, 12), "text-anchor": "start" } : { x: Math.min(x + 8, width - 12), "text-anchor": "end" };
+  element(svg, "text", { class: "aftertext halo", y: y + (y > height - 80 ? -14 : 22), ...side }, `hinge, radius ${length(hinge.mean[2])}`);
+  element(svg, "text", { class: "halo", x: 12, y: 20 }, "solid: recorded path; dotted: circle about the hinge");
   scaleBar(svg, view, width, height);
 }

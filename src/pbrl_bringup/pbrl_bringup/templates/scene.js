@@ -6,7 +6,8 @@ const SCENE = { width: 760, height: 540, margin: 34 };
 function sceneBox(object, episode) {
   const along = (poses) => bounds(poses.flatMap((pose) => place(object.footprint, pose)));
   const seen = along(episode.recorded), reach = 0.45 * Math.max(seen[2] - seen[0], seen[3] - seen[1]);
-  const all = [seen, ...[episode.before, episode.after].filter((poses) => poses.length).map(along)];
+  const hinge = object.hinge ? [[...object.hinge.mean.slice(0, 2), ...object.hinge.mean.slice(0, 2)]] : [];
+  const all = [seen, ...hinge, ...[episode.before, episode.after].filter((poses) => poses.length).map(along)];
   const low = (k) => Math.max(Math.min(...all.map((box) => box[k])), seen[k] - reach);
   const high = (k) => Math.min(Math.max(...all.map((box) => box[k])), seen[k] + reach);
   return [low(0), low(1), high(2), high(3)];
@@ -38,6 +39,10 @@ function drawScene(svg, object, episode, room) {
   const after = element(svg, "path", { class: "after" });
   const pin = object.wheel ? element(svg, "circle", { class: "pin", r: 6 }) : null;
   const pivot = object.hinge ? element(svg, "circle", { class: "pin", r: 6 }) : null;
+  if (pivot) {
+    const [x, y] = view.map(object.hinge.mean);
+    element(svg, "circle", { class: "after trail", cx: x, cy: y, r: object.hinge.mean[2] * view.scale, "stroke-dasharray": "3 5" });
+  }
   const pinText = pin || pivot ? element(svg, "text", { class: "aftertext halo" }, pin ? "held here" : "turns here") : null;
   const grippers = episode.contacts.map(() => element(svg, "circle", { class: "gripper", r: 5.5 }));
   const shaft = element(svg, "path", { class: "force" }), head = element(svg, "path", { class: "forcehead" });
@@ -102,7 +107,8 @@ function drawScene(svg, object, episode, room) {
     const outside = corners.every((p) => p[0] < 0 || p[0] > SCENE.width || p[1] < 0 || p[1] > SCENE.height);
     beforeText.textContent = outside ? `before learning: out of sight, ${length(parted)} off` : "before learning";
     beforeText.setAttribute("visibility", parted > 0.06 ? "visible" : "hidden");
-    beforeText.setAttribute("x", Math.min(Math.max(x, 130), SCENE.width - 130));
+    const half = beforeText.textContent.length * 3.9; // [px] at least as wide as the text, which is centred
+    beforeText.setAttribute("x", Math.min(Math.max(x, half), SCENE.width - half));
     beforeText.setAttribute("y", Math.min(Math.max(y - 8, 40), SCENE.height - 44));
   }
 }
