@@ -12,18 +12,18 @@ from pbrl_model.errors import ModelError
 from pbrl_model.parameters import UNITS, BodyParameters, free_columns
 from pbrl_model.posterior import Posterior
 
-CLASSES = ["free", "wheel", "hinge"]
+CLASSES = ["free", "wheel", "wheel+ground", "hinge"]
 
 
 def posterior(name: str) -> Posterior:
     names = free_columns(name)
     draws = np.random.default_rng(0).normal(size=(3, 7, len(names)))
     base = BodyParameters(2.0, anchor_x=0.3, hinge_radius=0.5 if name == "hinge" else float("nan"))
-    return Posterior("Tisch № 1", name, names, draws, base, -12.5, float("nan"))
+    return Posterior("Tisch № 1", name, names, draws, base, -12.5, float("nan"), ("the data do not say µ",))
 
 
 def same(one: Posterior, two: Posterior) -> bool:
-    fields = ("object", "model_class", "names", "log_evidence")
+    fields = ("object", "model_class", "names", "log_evidence", "notes")
     return (
         all(getattr(one, field) == getattr(two, field) for field in fields)
         and one.draws.tobytes() == two.draws.tobytes()

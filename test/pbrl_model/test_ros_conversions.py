@@ -22,7 +22,9 @@ STAMP = Time(sec=12, nanosec=34)
 def posterior(name: str, scale: float = 0.1) -> Posterior:
     names = free_columns(name)
     draws = 0.3 + scale * np.random.default_rng(0).normal(size=(2, 40, len(names)))
-    return Posterior(f"table {name}", name, names, draws, log_evidence=float("nan"), heldout_rmse=0.01)
+    return Posterior(
+        f"table {name}", name, names, draws, log_evidence=float("nan"), heldout_rmse=0.01, notes=("vague",)
+    )
 
 
 @pytest.mark.parametrize("name", MODEL_CLASSES)
@@ -35,6 +37,7 @@ def test_messages_round_trip_through_serialization(name: str) -> None:
     np.testing.assert_array_equal(wire.mean, found.mean())
     np.testing.assert_array_equal(wire.sd, found.sd())
     assert wire.draws == 80 and np.isnan(back.log_evidence) and back.heldout_rmse == 0.01
+    assert back.notes == ("vague",)
 
 
 def test_many_models_are_one_message() -> None:

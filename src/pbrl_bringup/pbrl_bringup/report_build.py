@@ -101,6 +101,7 @@ def object_report(
         footprint=_points(geometry.footprint),
         casters=_points(geometry.casters),
         parameters=_parameters(geometry, canonical, rng),
+        notes=list(canonical.notes),
         wheel=wheel,
         hinge=hinge,
         episodes=episodes,

@@ -150,6 +150,7 @@ class ObjectReport(_Part):
     footprint: list[Point]
     casters: list[Point]
     parameters: list[Parameter]
+    notes: list[str] = []
     wheel: Wheel | None = None
     hinge: Hinge | None = None
     episodes: list[Episode]

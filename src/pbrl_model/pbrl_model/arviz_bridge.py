@@ -33,6 +33,7 @@ def to_inference_data(posterior: Posterior) -> Any:
             "base": json.dumps({name: _number(value) for name, value in asdict(posterior.base).items()}),
             "log_evidence": posterior.log_evidence,
             "heldout_rmse": posterior.heldout_rmse,
+            "notes": json.dumps(posterior.notes),
         }
     )
     return data
@@ -62,6 +63,7 @@ def from_inference_data(data: Any) -> Posterior:
             base=BodyParameters(**base),
             log_evidence=float(attributes["log_evidence"]),
             heldout_rmse=float(attributes["heldout_rmse"]),
+            notes=tuple(map(str, json.loads(attributes["notes"]))),
         )
     except (KeyError, TypeError, ValueError) as error:
         what = " ".join(str(error).split())

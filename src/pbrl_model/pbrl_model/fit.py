@@ -54,7 +54,6 @@ class ObjectFit:
         noise: (chains, n, 2) draws of sigma (scale of the pose noise) and left-out force [N].
         acceptance: (chains, 2) share of proposals taken, physics and noise.
         heldout: errors on what was left out, or None.
-        notes: what the data do not say, in sentences.
         motions: the episodes on one clock.
         body: centre of mass and inertia over mass.
     """
@@ -63,9 +62,13 @@ class ObjectFit:
     noise: Array
     acceptance: Array
     heldout: Heldout | None
-    notes: tuple[str, ...]
     motions: tuple[Motion, ...]
     body: MassProperties
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Return what the data do not say, in sentences."""
+        return self.posterior.notes
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -197,7 +200,7 @@ def _fit_object(rng: np.random.Generator, recording: Recording, name: str, optio
     notes = notes_on(posterior, target.prior, motions, rng)
     if likelihood.with_drag:
         notes += note_on_left_out(noise, target.left_out_force)
-    return ObjectFit(posterior, noise, chains.acceptance, heldout, notes, motions, body)
+    return ObjectFit(replace(posterior, notes=notes), noise, chains.acceptance, heldout, motions, body)
 
 
 def _check_felt(name: str, motions: Sequence[Motion]) -> None:

@@ -27,6 +27,7 @@ class Posterior:
         base: values of the parameters that were not learned.
         log_evidence: [nat]; NaN where it was not computed.
         heldout_rmse: position error on windows left out of the fit [m]; NaN where none were.
+        notes: what the data do not say, in sentences.
     """
 
     object: str
@@ -36,6 +37,7 @@ class Posterior:
     base: BodyParameters = field(default_factory=lambda: BodyParameters(mass=1.0))
     log_evidence: float = math.nan
     heldout_rmse: float = math.nan
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         draws = np.array(self.draws, dtype=float)

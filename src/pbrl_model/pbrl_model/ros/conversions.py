@@ -27,6 +27,7 @@ def posterior_to_msg(posterior: Posterior) -> ObjectModel:
         samples=flat.ravel().tolist(),
         log_evidence=canonical.log_evidence,
         heldout_rmse=canonical.heldout_rmse,
+        notes=list(canonical.notes),
     )
 
 
@@ -54,6 +55,7 @@ def posterior_from_msg(message: ObjectModel) -> Posterior:
         base=BodyParameters(mass=1.0),
         log_evidence=message.log_evidence,
         heldout_rmse=message.heldout_rmse,
+        notes=tuple(message.notes),
     )
 
 
