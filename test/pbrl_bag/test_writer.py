@@ -138,13 +138,6 @@ def test_closing_twice_is_fine_and_writing_afterwards_is_not(tmp_path: Path) -> 
     assert writer.message_count == 1
 
 
-def test_discarding_leaves_nothing(tmp_path: Path) -> None:
-    writer = BagWriter(tmp_path / "bag")
-    writer.write("/say", STRING, String(data="x"), 1)
-    writer.discard()
-    assert not (tmp_path / "bag").exists()
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.files import output_folder, whole_folder, write_json, write_text
+from pbrl_bringup.files import output_folder, removed_afterwards, whole_folder, write_json, write_text
 
 
 def test_text_is_replaced_whole(tmp_path: Path) -> None:
@@ -49,3 +49,15 @@ def test_results_do_not_go_into_a_file(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("")
     with pytest.raises(BringupError, match="expected a folder for results"):
         output_folder(tmp_path / "out")
+
+
+def test_a_folder_is_removed_however_the_block_ends(tmp_path: Path) -> None:
+    """Ctrl-C between two files of a bag once left the first behind."""
+    folder = tmp_path / "unfinished"
+    with pytest.raises(KeyboardInterrupt), removed_afterwards(folder):
+        (folder / "bag").mkdir(parents=True)
+        (folder / "bag/half").write_text("x")
+        raise KeyboardInterrupt
+    assert not folder.exists()
+    with removed_afterwards(folder):
+        pass  # never made: nothing to remove, and no error

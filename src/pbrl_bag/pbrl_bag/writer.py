@@ -7,7 +7,6 @@ handed to the disk, so a process that is killed loses no more than that and the 
 from __future__ import annotations
 
 import os
-import shutil
 import threading
 import time
 from collections.abc import Iterable
@@ -187,11 +186,6 @@ class BagWriter:
             raise self._disk(error) from error
         if self._failure:
             raise self._disk(self._failure)
-
-    def discard(self) -> None:
-        """Close and remove the folder, for a recording that came to nothing."""
-        self.close()
-        shutil.rmtree(self.folder)
 
     def _schema(self, type_name: str) -> int:
         """Return the id of a type's schema, registered on first use."""

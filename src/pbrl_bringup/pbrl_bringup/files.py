@@ -62,6 +62,15 @@ def whole_folder(path: Path) -> Iterator[Path]:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
+@contextmanager
+def removed_afterwards(folder: Path) -> Iterator[None]:
+    """Remove a folder when the block ends, however it ends and however much of the folder was made."""
+    try:
+        yield
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def refuse_existing(path: Path) -> None:
     """Raise BringupError where `path` holds something that would be overwritten, or cannot be a name."""
     try:

@@ -30,7 +30,7 @@ from krang_sim.observations import (
 from krang_sim.session import KrangSession
 from pbrl_bag.writer import BagWriter
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.files import new_folder_place
+from pbrl_bringup.files import new_folder_place, removed_afterwards
 from pbrl_bringup.paths import config_file
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
 from pbrl_control.loop import ControlLoop, LoopCommand
@@ -91,19 +91,11 @@ def simulate_push(
     new_folder_place(bag)
     unfinished = bag.with_name(f".{bag.name}.part")
     settings = load_section(config_file("params", "body_controller"), ControllerSettings, "settings")
-    with KrangSession(scene, seed=seed, gui=gui) as session:
+    with KrangSession(scene, seed=seed, gui=gui) as session, removed_afterwards(unfinished):
         # The name inside the bag is the folder's, so the folder is made under its own name elsewhere.
-        writer = BagWriter(unfinished / bag.name, live=False)
-        try:
-            with writer:
-                end = _run(_Run(session, plan, settings, writer), advance or (lambda time, phase: None))
-            (unfinished / bag.name).replace(bag)
-            unfinished.rmdir()
-        except BaseException:
-            if (unfinished / bag.name).exists():
-                writer.discard()
-                unfinished.rmdir()
-            raise
+        with BagWriter(unfinished / bag.name, live=False) as writer:
+            end = _run(_Run(session, plan, settings, writer), advance or (lambda time, phase: None))
+        (unfinished / bag.name).replace(bag)
         return SimulatedPush(bag, str(end.phase), end.status, session.time, writer.message_count)
 
 
