@@ -183,6 +183,8 @@ def bench(
 def main() -> None:
     """Run the command line of this process and exit with its code."""
     signal.signal(signal.SIGTERM, _leave)
+    # A shell starts what it puts in the background deaf to Ctrl-C, and every process below it would inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.exit(run_arguments(sys.argv[1:]))
 
 
