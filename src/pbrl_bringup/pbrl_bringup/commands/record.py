@@ -25,8 +25,8 @@ def command(out: Path, duration: float, domain: int | None) -> int:
     node = Node(package="pbrl_bag", executable="recorder_node", parameters={"output": str(out)})
     with tempfile.TemporaryDirectory() as logs, Programs(Path(logs), outside_environment(domain)) as programs:
         recorder = programs.start("recorder", node_command("recorder", node))
-        say(f"pbrl: recording into {out}; {f'for {duration:g} s' if duration else 'Ctrl-C ends it'}")
-        try:
+        try:  # Ctrl-C may come as soon as it is named
+            say(f"pbrl: recording into {out}; {f'for {duration:g} s' if duration else 'Ctrl-C ends it'}")
             programs.ended("recorder", duration or FOREVER)
         except KeyboardInterrupt:
             say("pbrl: closing the bag")

@@ -24,8 +24,8 @@ def command(graph: str, settings: Sequence[str], optional: Sequence[str], domain
     say(f"pbrl: {chosen.description.strip()}")
     with running_graph(chosen, logs, number) as programs, GraphClient(number, programs.check) as client:
         wait_ready(chosen, client)
-        say(f"pbrl: {', '.join(chosen.nodes)} run in ROS_DOMAIN_ID {number}, output in {logs}; Ctrl-C stops them")
-        try:
+        try:  # Ctrl-C may come as soon as it is named
+            say(f"pbrl: {', '.join(chosen.nodes)} run in ROS_DOMAIN_ID {number}, output in {logs}; Ctrl-C stops them")
             client.stay()
         except KeyboardInterrupt:
             say("pbrl: stopping")
