@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from bullet_sim.catalogue import OfficeTable
+from bullet_sim.catalogue import OfficeTable, UtilityCart
 from bullet_sim.errors import SimError
 from bullet_sim.scene import Scene, load_scene, placed_footprint
 from bullet_sim.settings import parse_settings
@@ -26,7 +26,7 @@ def test_shipped_scene_loads_under_its_own_name(name: str) -> None:
 
 
 def test_shipped_scenes_are_the_promised_ones() -> None:
-    assert {"locked_caster", "free_table", "three_tables", "heavy_table"} <= set(SHIPPED)
+    assert {"locked_caster", "free_table", "three_tables", "heavy_table", "utility_cart"} <= set(SHIPPED)
 
 
 @pytest.mark.parametrize("name", ["locked_caster", "free_table", "three_tables", "heavy_table"])
@@ -48,6 +48,16 @@ def test_free_and_locked_table_differ_in_what_is_concealed_alone() -> None:
     assert free.concealed != locked.concealed
 
 
+def test_cart_has_its_rim_at_the_height_and_ahead_of_the_left_gripper() -> None:
+    # In the posture steel_cart_push the left plates end at (0.602, 0.117), their middle at z 0.896.
+    scene = load_scene(SCENES / "utility_cart.yaml")
+    cart = scene.bodies["cart_a"]
+    assert isinstance(cart, UtilityCart)
+    assert scene.robot.posture == "steel_cart_push"
+    assert cart.height - cart.bar / 2 == pytest.approx(0.896, abs=0.002)
+    assert 0.10 < placed_footprint(cart).bounds[0] - 0.602 < 0.20
+
+
 def test_outlines_come_out_counter_clockwise() -> None:
     plain = valid()
     plain["room"]["outline"].reverse()
@@ -60,6 +70,7 @@ def valid() -> dict[str, Any]:
 
 SELF_CROSSING = [[-1, -1], [5, 5], [5, -1], [-1, 5]]
 SEVEN = [0.0] * 7
+CART = {"kind": "utility_cart", "size": [0.9, 0.6], "height": 0.9, "nominal_mass": 30.0, "pose": [1.2, 0.0, 0.0]}
 HOSTILE = [
     ("rooom", {}, r"rooom: unknown key; did you mean 'room'\?"),
     ("bodies.table_a.heigth", 1.0, r"bodies\.table_a\.heigth: unknown key; did you mean 'height'\?"),
@@ -99,6 +110,19 @@ HOSTILE = [
     ("sensors.wrist_ft.force_noise", [0.1, -0.1, 0.1], r"sensors\.wrist_ft\.force_noise\.1: expected greater than"),
     ("concealed.locked_casters", {"table_a": ["rear_rigth"]}, r"no caster 'rear_rigth'; did you mean 'rear_right'\?"),
     ("concealed.locked_casters", {"pillar": ["rear"]}, r"pillar: expected a body on casters, got a fixture"),
+    ("concealed.fixed_wheels", {"table_a": ["rear_rigth"]}, r"no caster 'rear_rigth'; did you mean 'rear_right'\?"),
+    (
+        "concealed.fixed_wheels",
+        {"pillar": ["rear"]},
+        r"fixed_wheels\.pillar: expected a body on casters",
+    ),
+    (
+        "bodies.table_a",
+        CART | {"lower_shelf": 0.1},
+        r"lower_shelf: expected a height between casters and top",
+    ),
+    ("bodies.table_a", CART | {"size": [0.9, 0.1]}, r"expected shelves of more than two caster insets, got \[0\.7"),
+    ("bodies.table_a", CART | {"nominal_mass": 7.0}, r"nominal_mass: expected over twice its casters' 4\.00 kg, got 7"),
     ("concealed.mass", {"tabel_a": 3.0}, r"concealed\.mass: no body 'tabel_a' in this scene; did you mean 'table_a'"),
 ]
 

@@ -230,6 +230,7 @@ def test_same_seed_same_messages(near_scene, make_session):
 
 CONCEALED = {
     "locked_casters": {"desk": ["front_right"]},
+    "fixed_wheels": {"desk": ["front_left"]},
     "mass": {"desk": 47.8125},
     "rolling_resistance": {"desk": 0.00414},
 }
@@ -243,7 +244,7 @@ def test_concealed_part_is_in_no_message(make_scene, make_session):
     for number in (47.8125, 0.00414):
         assert struct.pack("<d", number) not in everything
         assert struct.pack("<f", number) not in everything
-    for word in (b"concealed", b"locked", b"front_right", b"front_left", b"rolling"):
+    for word in (b"concealed", b"locked", b"front_right", b"front_left", b"rolling", b"fixed_wheels"):
         assert word not in everything
 
 

@@ -39,10 +39,11 @@ def test_every_command_has_help_with_an_example(name: str, capsys: pytest.Captur
 
 
 def test_the_contract_s_commands_are_there() -> None:
-    assert sorted(["demo", "test", "fit", "simulate", "run", "record", "play", "info", "bench"]) == COMMANDS
+    names = ["demo", "test", "fit", "simulate", "run", "record", "play", "info", "bench", "experiment"]
+    assert sorted(names) == COMMANDS
 
 
-@pytest.mark.parametrize("name", ["demo", "fit", "simulate", "bench"])
+@pytest.mark.parametrize("name", ["demo", "fit", "simulate", "bench", "experiment"])
 def test_randomness_has_a_seed(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     run_arguments([name, "--help"])
     assert "--seed" in capsys.readouterr().out
@@ -58,6 +59,7 @@ def test_randomness_has_a_seed(name: str, capsys: pytest.CaptureFixture[str]) ->
         (("simulate", "locked_castor", "--out", "bag"), ("locked_castor", "locked_caster")),
         (("simulate", "locked_caster", "--out", "bag", "--push", "nothing"), ("nothing", "turn_table")),
         (("bench", "wheal"), ("wheal", "wheel")),
+        (("experiment", "apartement"), ("apartement", "apartment")),
         (("run", "krang_puhs"), ("krang_puhs", "krang_push")),
         (("run", "krang_push", "--set", "sim"), ("'sim'", "NODE.PARAMETER=VALUE")),
         (("run", "krang_push", "--with", "camera"), ("'camera'", "recorder")),

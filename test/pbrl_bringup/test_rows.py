@@ -12,6 +12,7 @@ from bullet_sim.catalogue import CasterSettings
 from pbrl_bringup.benches.rows import Measured, at_least, at_most, last_line, report, within
 from pbrl_bringup.benches.sim import kinematics_errors, rolling_acceleration
 from pbrl_bringup.commands.bench import BENCHES
+from pbrl_bringup.commands.experiment import EXPERIMENTS
 
 
 def measured(seed: int, quick: bool, out: Path) -> Measured:
@@ -44,8 +45,9 @@ def test_within_is_a_band(value: float, holds: bool) -> None:
 
 
 def test_every_bench_has_a_module() -> None:
-    folder = Path(measured.__code__.co_filename).parents[2] / "src/pbrl_bringup/pbrl_bringup/benches"
-    assert all((folder / f"{name}.py").is_file() for name in BENCHES)
+    package = Path(measured.__code__.co_filename).parents[2] / "src/pbrl_bringup/pbrl_bringup"
+    assert all((package / f"benches/{name}.py").is_file() for name in BENCHES)
+    assert all((package / f"experiments/{name.replace('-', '_')}.py").is_file() for name in EXPERIMENTS)
 
 
 def test_the_simulated_arms_are_where_the_vectors_say() -> None:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from bullet_sim.scene import load_scene
+from krang_sim.session import KrangSession
 from pbrl_bag import cut_episodes, describe, read_recording
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.simulate import SimulatedPush, simulate_push
+from pbrl_bringup.simulate import SimulatedPush, fallen_body, simulate_push
 from pbrl_control.push_plan import PushPlan, Segment, load_plan
 
 
@@ -76,6 +77,17 @@ def test_nothing_is_left_of_a_simulation_that_is_stopped(tmp_path: Path) -> None
     with pytest.raises(KeyboardInterrupt):
         simulate_push(load_scene("locked_caster"), short_plan(), 0, tmp_path / "bag", advance=stop)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("tilt", "fallen"), [(0.0, False), (0.2, False), (0.6, True), (np.pi, True)])
+def test_a_body_that_tipped_over_is_said(tilt: float, fallen: bool) -> None:
+    with KrangSession(load_scene("free_table"), seed=0) as session:
+        client = session.world.client
+        lean = [0.0, np.sin(tilt / 2), 0.0, np.cos(tilt / 2)]
+        client.api.resetBasePositionAndOrientation(client.body("table_a"), [2.0, 0.0, 0.8], lean)
+        sentence = fallen_body(session)
+    assert ("table_a tipped over" in sentence) == fallen
+    assert (f"{np.degrees(tilt):.0f} degrees" in sentence) == fallen
 
 
 def test_an_existing_recording_is_kept(tmp_path: Path) -> None:

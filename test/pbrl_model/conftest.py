@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -172,3 +172,29 @@ def make_recording() -> Callable[..., Recording]:
         return record_push(Push(**fields), seed)  # type: ignore[arg-type]
 
     return make
+
+
+@pytest.fixture(scope="session")
+def heard_by() -> Callable[[Recording, float], Recording]:
+    """Return a function that gives what of a recording had come in by a time [s]; what is held then still is."""
+
+    def cut(recording: Recording, time: float) -> Recording:
+        wrenches = {}
+        for side, felt in recording.wrenches.items():
+            keep = felt.time <= time
+            wrenches[side] = replace(felt, time=felt.time[keep], force=felt.force[keep], torque=felt.torque[keep])
+        end = max(float(felt.time[-1]) for felt in wrenches.values())
+        return replace(
+            recording,
+            object_poses={name: _seen_by(stream, time) for name, stream in recording.object_poses.items()},
+            gripper_poses={side: _seen_by(stream, time) for side, stream in recording.gripper_poses.items()},
+            wrenches=wrenches,
+            grasps=tuple(replace(grasp, end=min(grasp.end, end)) for grasp in recording.grasps if grasp.start < end),
+        )
+
+    return cut
+
+
+def _seen_by(stream: PoseStream, time: float) -> PoseStream:
+    keep = stream.time <= time
+    return PoseStream(stream.time[keep], stream.position[keep], stream.quaternion[keep])

@@ -30,6 +30,8 @@ def windows() -> Windows:
     return Windows(
         dt=DT,
         wrench=rng.normal(size=(count, STEPS, 3)) * [20, 20, 5],
+        rate=np.zeros((count, STEPS, 3)),
+        delay=0.0,
         heading=np.zeros((count, STEPS)),
         steps=np.full(count, STEPS),
         initial=rng.normal(size=(count, 6)) * 0.2,
@@ -117,6 +119,35 @@ def test_where_it_is_linearised_does_not_matter_for_a_linear_model(windows: Wind
     residuals = likelihood.residuals(row(), nuisance)
     found = likelihood.log_density(residuals, linear, np.array([SIGMA]), np.array([DRAG]))
     assert found[0] == pytest.approx(log_density(likelihood, row())[0], abs=1e-4)
+
+
+@pytest.mark.parametrize("rounds", [1, 4])
+def test_compiled_marginal_is_the_multivariate_normal(windows: Windows, rounds: int) -> None:
+    likelihood = WindowedLikelihood(BODY, windows)
+    start = np.random.default_rng(1).normal(size=(1, len(windows), 9))
+    one = np.ones(1)
+    found = likelihood.marginal(row(), SIGMA * one, DRAG * one, 0 * one, start, rounds=rounds)
+    assert found[0] == pytest.approx(brute_force(windows, DRAG), abs=2e-4)
+
+
+def test_compiled_climb_ends_where_nuisances_are_most_likely(windows: Windows) -> None:
+    likelihood = WindowedLikelihood(BODY, windows)
+    found, one = likelihood.at_rest(1), np.ones(1)
+    likelihood.marginal(row(), SIGMA * one, DRAG * one, 0 * one, found)
+    linear = likelihood.linearise(row(), likelihood.at_rest(1))
+    residuals = likelihood.residuals(row(), likelihood.at_rest(1))
+    best = likelihood.best_nuisance(residuals, linear, SIGMA * one, DRAG * one)
+    np.testing.assert_allclose(found, best, atol=0.02)
+
+
+def test_compiled_marginal_of_a_held_body_is_that_of_the_settled_linearisation(windows: Windows) -> None:
+    near = replace(windows, pose=0.05 * windows.pose + windows.initial[:, None, :3], covariance=windows.covariance / 9)
+    likelihood = WindowedLikelihood(BODY, near)
+    nuisance, noise = likelihood.at_rest(1), (np.array([8.0]), np.array([DRAG]))
+    compiled = likelihood.marginal(HELD, *noise, np.zeros(1), nuisance, rounds=8)
+    linear = likelihood.linearise(HELD, nuisance)
+    slow = likelihood.log_density(likelihood.residuals(HELD, nuisance), linear, *noise)
+    assert compiled[0] == pytest.approx(slow[0], abs=0.2)
 
 
 def test_best_nuisance_is_where_the_misfit_is_least(windows: Windows) -> None:

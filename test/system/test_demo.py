@@ -92,7 +92,8 @@ def test_the_page_and_the_numbers_are_about_the_table(
 
 def test_no_node_is_left(finished_demo: tuple[subprocess.CompletedProcess[str], Path]) -> None:
     assert finished_demo[0].returncode == 0
-    assert not [each for each in psutil.process_iter(["cmdline"]) if str(finished_demo[1]) in " ".join(each.cmdline())]
+    running = [" ".join(each.info["cmdline"] or []) for each in psutil.process_iter(["cmdline"])]
+    assert not [line for line in running if str(finished_demo[1]) in line]
 
 
 def test_ctrl_c_in_mid_run_leaves_nothing(tmp_path: Path) -> None:

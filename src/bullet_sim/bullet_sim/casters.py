@@ -1,14 +1,16 @@
-"""Casters: a fork on a swivel joint, a wheel on an axle; rolling resistance, bearing friction, brakes.
+"""Casters: a fork on a swivel joint or bolted on, a wheel on an axle; rolling resistance, bearing friction, brakes.
 
 The wheel touches the floor as a sphere. Bullet's cylinders are polygons unless told otherwise, which costs a
 rolling resistance as large as carpet, and even a true cylinder flickers between the ends of its line of contact,
 which would turn the swivel; a sphere has one contact point, under the axle, and rolls about the axle alone
 because the fork lets it do nothing else. What the width of the tread does (scrub torque) is added as Bullet's
-spinning friction.
+spinning friction, and where the make says so less of it the faster the wheel rolls: on its own Bullet resists a turn
+at full speed as much as one on the spot, and a cart that rolls round a bend carries the full scrub of all its wheels.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -37,6 +39,8 @@ class CasterLinks:
         angle: swivel angle [rad] it was left at.
         locked: whether swivel and wheel are braked. Both joints are then rigid: a brake made of Bullet's motors
             creeps, by as much as 3 cm of rolling for a table's turn by 50 degrees at 60 solver sweeps.
+        fixed: whether the fork is bolted on straight ahead, its axle under its place: the wheel rolls along the
+            body's x and holds across it.
     """
 
     name: str
@@ -45,6 +49,12 @@ class CasterLinks:
     wheel: int
     angle: float
     locked: bool
+    fixed: bool = False
+
+    @property
+    def swivels(self) -> bool:
+        """Whether the fork can turn."""
+        return not (self.locked or self.fixed)
 
 
 @dataclass
@@ -119,6 +129,7 @@ def add_caster_links(
     drop: float,
     angle: float,
     locked: bool,
+    fixed: bool = False,
 ) -> CasterLinks:
     """Append fork and wheel of one caster to a body that is being put together.
 
@@ -129,15 +140,17 @@ def add_caster_links(
         name: of the caster.
         place: swivel axis (2,) [m] in the body's frame.
         drop: height [m] of the body's base centre above the axle.
-        angle: swivel angle [rad] it was left at.
+        angle: swivel angle [rad] it was left at; a fixed one has none.
         locked: whether it is braked.
+        fixed: whether it does not swivel.
     """
     api = client.api
+    rigid, angle, trail = locked or fixed, 0.0 if fixed else angle, 0.0 if fixed else settings.trail
     half_fork = [0.018, 0.018, (settings.height - settings.radius) / 2]
     fork_shape = api.createVisualShape(
         bullet.GEOM_BOX,
         halfExtents=half_fork,
-        visualFramePosition=[-settings.trail / 2, 0, half_fork[2]],
+        visualFramePosition=[-trail / 2, 0, half_fork[2]],
         rgbaColor=[0.25, 0.25, 0.28, 1],
     )
     wheel_shape = api.createVisualShape(
@@ -154,13 +167,11 @@ def add_caster_links(
         (*place, -drop),
         -1,
         (0, 0, 1),
-        turn=angle if locked else 0.0,
-        rigid=locked,
+        turn=angle if rigid else 0.0,
+        rigid=rigid,
     )
-    wheel = links.add(
-        settings.wheel_mass, (tread, wheel_shape), (-settings.trail, 0, 0), swivel, (0, 1, 0), rigid=locked
-    )
-    return CasterLinks(name, place, swivel, wheel, angle, locked)
+    wheel = links.add(settings.wheel_mass, (tread, wheel_shape), (-trail, 0, 0), swivel, (0, 1, 0), rigid=locked)
+    return CasterLinks(name, place, swivel, wheel, angle, locked, fixed)
 
 
 class Casters:
@@ -194,6 +205,7 @@ class Casters:
         self._client, self._body, self._settings = client, client.body(body), settings
         self._rolling = [caster for caster in self.links if not caster.locked]
         self._index = {caster.wheel: number for number, caster in enumerate(self.links)}
+        self._scrub = settings.sliding_friction * settings.contact_width / 4  # lever of the torque on the spot [m]
         self._keep = float(np.exp(-client.step_time / LOAD_TIME))
         for caster in self.links:
             self._prepare(caster)
@@ -210,17 +222,33 @@ class Casters:
             localInertiaDiagonal=disc,
             lateralFriction=settings.sliding_friction,
             rollingFriction=0,
-            spinningFriction=settings.sliding_friction * settings.contact_width / 4,
+            spinningFriction=self._scrub,
             restitution=0,
         )
-        if not caster.locked:
+        if caster.swivels:
             api.resetJointState(self._body, caster.swivel, caster.angle)
             api.setJointMotorControl2(
                 self._body, caster.swivel, bullet.VELOCITY_CONTROL, targetVelocity=0, force=settings.swivel_friction
             )
 
     def update(self) -> None:
-        """Set each rolling wheel's resistance to f times the load it carries now; call before each step."""
+        """Bring friction up to date with load and motion of each wheel; call before each step."""
+        self._resist_rolling()
+        self._resist_turning()
+
+    def _resist_turning(self) -> None:
+        """Set each rolling wheel's scrub to what is left of it at the speed at which it rolls."""
+        api, length = self._client.api, self._settings.scrub_length
+        if length is None or not self._rolling:
+            return
+        wheels = [caster.wheel for caster in self._rolling]
+        for wheel, state in zip(wheels, api.getLinkStates(self._body, wheels, computeLinkVelocity=1), strict=True):
+            speed, turned = math.hypot(*state[6][:2]), length * abs(state[7][2])
+            share = turned / speed if speed > turned else 1.0
+            api.changeDynamics(self._body, wheel, spinningFriction=share * self._scrub)
+
+    def _resist_rolling(self) -> None:
+        """Set each rolling wheel's resistance to f times the load it carries now."""
         api = self._client.api
         seen = np.zeros(len(self.links))
         for contact in api.getContactPoints(self._body):
@@ -240,7 +268,9 @@ class Casters:
     def angles(self) -> Array:
         """Give the swivel angles (n,) [rad], zero where the wheel trails a body moving along its own +x."""
         states = self._client.api.getJointStates(self._body, [caster.swivel for caster in self.links])
-        turned = [caster.angle if caster.locked else state[0] for caster, state in zip(self.links, states, strict=True)]
+        turned = [
+            state[0] if caster.swivels else caster.angle for caster, state in zip(self.links, states, strict=True)
+        ]
         return np.array(turned)
 
     def contacts(self) -> Array:

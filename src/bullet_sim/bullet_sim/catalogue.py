@@ -1,4 +1,4 @@
-"""What stands in a room: office tables on casters, blocks that slide, fixtures that do not move.
+"""What stands in a room: tables and carts on casters, blocks that slide, fixtures that do not move.
 
 A body's own frame has its origin where its tag is glued, x forward and y left; outlines are seen from above.
 """
@@ -30,6 +30,10 @@ class CasterSettings(Settings):
         sliding_friction: Coulomb coefficient of the tread on a floor of friction 1.
         contact_width: width [m] of the tread that bears on the floor (treads are crowned); a wheel turned on the
             spot scrubs with a torque of sliding_friction N contact_width / 4.
+        scrub_length: a wheel that rolls while it turns lays down fresh tread, and that is twisted less: its scrub
+            torque is min(1, scrub_length |turn rate| / speed) times that on the spot. About half the length of the
+            patch (3 mm) over the twist at which all of it slides (0.15 rad) [m]; None: as on the spot at any speed,
+            which is the worst case.
         wheel_mass: [kg].
         fork_mass: [kg].
     """
@@ -41,6 +45,7 @@ class CasterSettings(Settings):
     swivel_friction: NonNegative = 0.04
     sliding_friction: Positive = 0.7
     contact_width: NonNegative = 0.008
+    scrub_length: NonNegative | None = None
     wheel_mass: Positive = 0.25
     fork_mass: Positive = 0.20
 
@@ -51,47 +56,24 @@ class CasterSettings(Settings):
         return self
 
 
-class OfficeTable(Settings):
-    """A slab on four legs on four casters.
+class OnCasters(Settings):
+    """What all bodies on casters have in common.
 
     Attributes:
         size: extent along the body's x and y [m].
         height: top face above the floor [m].
-        slab: thickness of the top [m]; its edge is what a gripper clamps.
         nominal_mass: what the robot is told, casters included [kg].
         pose: (x, y, theta) of the tag, which is glued on the middle of the top.
-        leg_inset: from the edges to the legs' middle [m].
-        casters: the make of all four.
-        caster_positions: swivel axes [m] by name in the body's frame; default: under the four legs.
+        casters: the make of all of them.
+        caster_positions: swivel axes [m] by name in the body's frame; default: four, under its corners.
     """
 
-    kind: Literal["office_table"]
     size: tuple[Positive, Positive]
     height: Positive
-    slab: Positive = 0.025
     nominal_mass: Positive
     pose: Vector3
-    leg_inset: Positive = 0.06
     casters: CasterSettings = CasterSettings()
     caster_positions: dict[str, Vector2] = Field(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _stands(self) -> Self:
-        if self.height <= self.casters.height + self.slab:
-            raise ValueError(f"expected a height above casters and slab, got {self.height} m")
-        if min(self.size) <= 2 * self.leg_inset:
-            raise ValueError(f"expected a size of more than two leg insets, got {list(self.size)} m")
-        places = list(self.swivels.values())
-        if len(places) < 3 or not Polygon(places).convex_hull.buffer(-1e-3).contains(Point(0, 0)):
-            raise ValueError("caster_positions: expected at least three casters around the table's middle")
-        if any(abs(x) > self.size[0] / 2 or abs(y) > self.size[1] / 2 for x, y in places):
-            raise ValueError("caster_positions: expected casters under the table, got one outside its size")
-        light = len(places) * (self.casters.wheel_mass + self.casters.fork_mass)
-        if self.nominal_mass <= 2 * light:
-            raise ValueError(
-                f"nominal_mass: expected over twice its casters' {light:.2f} kg, got {self.nominal_mass} kg"
-            )
-        return self
 
     @property
     def footprint(self) -> Array:
@@ -100,16 +82,115 @@ class OfficeTable(Settings):
         return np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
 
     @property
+    def corner(self) -> Vector2:
+        """Where the front left caster is [m] unless `caster_positions` says otherwise; the others mirror it."""
+        raise NotImplementedError
+
+    @property
+    def swivels(self) -> dict[str, Vector2]:
+        """Swivel axes [m] by caster name in the body's frame; front is +x, left is +y."""
+        x, y = self.corner
+        four = {"front_left": (x, y), "front_right": (x, -y), "rear_left": (-x, y), "rear_right": (-x, -y)}
+        return dict(self.caster_positions) or four
+
+    def _check_casters(self, what: str) -> None:
+        """Raise ValueError where the casters do not carry the body; `what` is its kind, for the message."""
+        places = list(self.swivels.values())
+        if len(places) < 3 or not Polygon(places).convex_hull.buffer(-1e-3).contains(Point(0, 0)):
+            raise ValueError(f"caster_positions: expected at least three casters around the {what}'s middle")
+        if any(abs(x) > self.size[0] / 2 or abs(y) > self.size[1] / 2 for x, y in places):
+            raise ValueError(f"caster_positions: expected casters under the {what}, got one outside its size")
+        light = len(places) * (self.casters.wheel_mass + self.casters.fork_mass)
+        if self.nominal_mass <= 2 * light:
+            raise ValueError(
+                f"nominal_mass: expected over twice its casters' {light:.2f} kg, got {self.nominal_mass} kg"
+            )
+
+
+class OfficeTable(OnCasters):
+    """A slab on four legs, a caster under each.
+
+    Attributes:
+        slab: thickness of the top [m]; its edge is what a gripper clamps.
+        leg_inset: from the edges to the legs' middle [m].
+    """
+
+    kind: Literal["office_table"]
+    slab: Positive = 0.025
+    leg_inset: Positive = 0.06
+
+    @model_validator(mode="after")
+    def _stands(self) -> Self:
+        if self.height <= self.casters.height + self.slab:
+            raise ValueError(f"expected a height above casters and slab, got {self.height} m")
+        if min(self.size) <= 2 * self.leg_inset:
+            raise ValueError(f"expected a size of more than two leg insets, got {list(self.size)} m")
+        self._check_casters("table")
+        return self
+
+    @property
     def levels(self) -> tuple[float, float]:
         """Heights [m] between which the footprint is solid; below a table's top there is room."""
         return self.height - self.slab, self.height
 
     @property
-    def swivels(self) -> dict[str, Vector2]:
-        """Swivel axes [m] by caster name in the body's frame; front is +x, left is +y."""
-        x, y = self.size[0] / 2 - self.leg_inset, self.size[1] / 2 - self.leg_inset
-        four = {"front_left": (x, y), "front_right": (x, -y), "rear_left": (-x, y), "rear_right": (-x, -y)}
-        return dict(self.caster_positions) or four
+    def corner(self) -> Vector2:
+        """Under the front left leg [m]."""
+        return self.size[0] / 2 - self.leg_inset, self.size[1] / 2 - self.leg_inset
+
+
+class CartCasters(CasterSettings):
+    """A 125 mm caster, as carts have; the numbers mean what they mean in `CasterSettings`."""
+
+    radius: Positive = 0.0625
+    trail: NonNegative = 0.040
+    height: Positive = 0.156
+    contact_width: NonNegative = 0.010
+    scrub_length: NonNegative | None = 0.02
+    wheel_mass: Positive = 0.55
+    fork_mass: Positive = 0.45
+
+
+class UtilityCart(OnCasters):
+    """Two shelves between four posts, and at the height of the upper one a push bar along each short end.
+
+    Attributes:
+        bar: diameter of the push bars [m], and thickness of the shelves; a bar is what a gripper clamps.
+        bar_gap: between a bar and the upper shelf [m].
+        lower_shelf: height of the lower shelf's top face [m].
+        caster_inset: from the shelf's edges to the swivel axes [m].
+    """
+
+    kind: Literal["utility_cart"]
+    casters: CartCasters = CartCasters()
+    bar: Positive = 0.032
+    bar_gap: Positive = 0.060
+    lower_shelf: Positive = 0.30
+    caster_inset: Positive = 0.05
+
+    @model_validator(mode="after")
+    def _stands(self) -> Self:
+        if not self.casters.height + self.bar < self.lower_shelf < self.height - self.bar:
+            raise ValueError(f"lower_shelf: expected a height between casters and top, got {self.lower_shelf} m")
+        if min(self.shelf) <= 2 * self.caster_inset:
+            raise ValueError(f"expected shelves of more than two caster insets, got {list(self.shelf)} m")
+        self._check_casters("cart")
+        return self
+
+    @property
+    def shelf(self) -> Vector2:
+        """Extent of the shelves along the body's x and y [m]: its size without bars and gaps."""
+        return self.size[0] - 2 * (self.bar + self.bar_gap), self.size[1]
+
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Heights [m] between which the footprint is solid."""
+        return self.lower_shelf - self.bar, self.height
+
+    @property
+    def corner(self) -> Vector2:
+        """Under the front left corner of the shelves [m]."""
+        return self.shelf[0] / 2 - self.caster_inset, self.shelf[1] / 2 - self.caster_inset
 
 
 class Block(Settings):
@@ -166,4 +247,4 @@ class Fixture(Settings):
         return 0.0, self.height
 
 
-Body = Annotated[OfficeTable | Block | Fixture, Field(discriminator="kind")]
+Body = Annotated[OfficeTable | UtilityCart | Block | Fixture, Field(discriminator="kind")]

@@ -118,10 +118,9 @@ def find_clamp(furniture: Iterable[Furniture], gripper: Pose, spec: GripperSpec)
         spec: its plates.
     """
     best: ClampTest | None = None
-    for body in furniture:
-        if body.slab is None or body.slab.top - body.slab.bottom > spec.opening:
-            continue
-        found = _test_body(body.name, body.slab, body.pose(), gripper, spec)
+    thin = ((body, slab) for body in furniture for slab in body.slabs if slab.top - slab.bottom <= spec.opening)
+    for body, slab in thin:
+        found = _test_slab(body.name, slab, body.pose(), gripper, spec)
         rank = (found.clamp is None, found.distance)
         if best is None or rank < (best.clamp is None, best.distance):
             best = found
@@ -131,8 +130,8 @@ def find_clamp(furniture: Iterable[Furniture], gripper: Pose, spec: GripperSpec)
     return best
 
 
-def _test_body(name: str, slab: Slab, pose: Pose, gripper: Pose, spec: GripperSpec) -> ClampTest:
-    """Test one body's slab."""
+def _test_slab(name: str, slab: Slab, pose: Pose, gripper: Pose, spec: GripperSpec) -> ClampTest:
+    """Test one slab of a body."""
     start, middle, end = (
         pose.inverse_point(gripper.point(point))
         for point in (spec.along(spec.plate_start), spec.middle, spec.along(spec.plate_end))

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely.geometry import Point, Polygon
 
 from bullet_sim.casters import Casters
-from bullet_sim.catalogue import Block, Fixture, OfficeTable
+from bullet_sim.catalogue import Body
 from bullet_sim.client import BulletClient, Pose, Twist, cross
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ class Furniture:
     Attributes:
         name: in the scene.
         settings: what the scene says of it.
-        slab: what can be clamped; None where nothing can.
+        slabs: what can be clamped.
         casters: its casters; None where it has none.
     """
 
@@ -43,14 +44,14 @@ class Furniture:
         self,
         client: BulletClient,
         name: str,
-        settings: OfficeTable | Block | Fixture,
+        settings: Body,
         tag: Array,
         *,
-        slab: Slab | None = None,
+        slabs: tuple[Slab, ...] = (),
         casters: Casters | None = None,
     ) -> None:
         """Take note of a body that is in the client already; `tag` (3,) [m] is the tag in the base's own frame."""
-        self.name, self.settings, self.slab, self.casters = name, settings, slab, casters
+        self.name, self.settings, self.slabs, self.casters = name, settings, slabs, casters
         self._client, self._tag = client, tag
 
     def pose(self) -> Pose:
@@ -68,6 +69,11 @@ class Furniture:
         lever = centre.matrix @ self._tag
         pose = Pose(centre.position + lever, centre.quaternion)
         return pose, Twist(motion.linear + cross(motion.angular, lever), motion.angular)
+
+    def slab_at(self, point: Array) -> Slab:
+        """Give the slab in which a clamped `point` (3,) [m] of the tag frame lies, or that nearest to it."""
+        middle = Point(point[:2])
+        return min(self.slabs, key=lambda slab: float(Polygon(slab.outline).distance(middle)))
 
     def apply_force(self, force: Array, point: Array) -> None:
         """Push with `force` (3,) [N] at `point` (3,) [m], both in `world`, during the next step."""

@@ -75,11 +75,11 @@ class Grip:
         Raises:
             SimError: the clamp is of another body, or the body has no edge.
         """
-        if body.slab is None or clamp.body != body.name:
+        if not body.slabs or clamp.body != body.name:
             raise SimError(f"grip: expected a clamp on an edge of {body.name!r}, got one on {clamp.body!r}")
         self.clamp, self.slipped, self.lost = clamp, 0.0, False
         self._client, self._gripper, self._spec, self._body = client, gripper, spec, body
-        self._slab = body.slab
+        self._slab = body.slab_at(clamp.contact)
         self._hand = spec.along(clamp.reach)  # where the bristle ends, in the gripper's frame
         self._root = clamp.contact.copy()  # where it begins, in the body's tag frame
         self._turn = self._relative_turn(self._gripper_state()[0], body.pose())

@@ -15,7 +15,7 @@ from ament_index_python.packages import PackageNotFoundError, get_package_share_
 from pydantic import Field, model_validator
 from shapely.geometry import Point, Polygon
 
-from bullet_sim.catalogue import Block, Body, Fixture, OfficeTable
+from bullet_sim.catalogue import Body, OnCasters
 from bullet_sim.errors import SimError, nearest
 from bullet_sim.settings import (
     Fraction,
@@ -133,11 +133,13 @@ class Concealed(Settings):
 
     Attributes:
         locked_casters: names of the casters whose wheel and swivel are both braked.
+        fixed_wheels: names of the casters that do not swivel: their wheels roll along the body's x alone.
         mass: true mass [kg] where it is not the nominal one.
         rolling_resistance: true lever f [m] of all casters of a body where it is not its `casters`' one.
     """
 
     locked_casters: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    fixed_wheels: dict[str, tuple[str, ...]] = Field(default_factory=dict)
     mass: dict[str, Positive] = Field(default_factory=dict)
     rolling_resistance: dict[str, NonNegative] = Field(default_factory=dict)
 
@@ -166,15 +168,14 @@ class Scene(Settings):
         for effect in type(self.concealed).model_fields:
             for name in getattr(self.concealed, effect):
                 self._known_body(name, f"concealed.{effect}")
-        for name, locked in self.concealed.locked_casters.items():
-            swivels = self._table(name, "locked_casters").swivels
-            for caster in locked:
-                if caster not in swivels:
-                    raise ValueError(
-                        f"concealed.locked_casters.{name}: no caster {caster!r}; {nearest(caster, swivels)}"
-                    )
+        for effect in ("locked_casters", "fixed_wheels"):
+            for name, casters in getattr(self.concealed, effect).items():
+                swivels = self._on_casters(name, effect).swivels
+                for caster in casters:
+                    if caster not in swivels:
+                        raise ValueError(f"concealed.{effect}.{name}: no caster {caster!r}; {nearest(caster, swivels)}")
         for name in self.concealed.rolling_resistance:
-            self._table(name, "rolling_resistance")
+            self._on_casters(name, "rolling_resistance")
         return self
 
     @model_validator(mode="after")
@@ -199,14 +200,14 @@ class Scene(Settings):
         if name not in self.bodies:
             raise ValueError(f"{place}: no body {name!r} in this scene; {nearest(name, self.bodies)}")
 
-    def _table(self, name: str, effect: str) -> OfficeTable:
+    def _on_casters(self, name: str, effect: str) -> OnCasters:
         body = self.bodies[name]
-        if not isinstance(body, OfficeTable):
+        if not isinstance(body, OnCasters):
             raise ValueError(f"concealed.{effect}.{name}: expected a body on casters, got a {body.kind}")
         return body
 
 
-def placed_footprint(body: OfficeTable | Block | Fixture) -> Polygon:
+def placed_footprint(body: Body) -> Polygon:
     """Give a body's footprint at its starting pose in `world`."""
     x, y, theta = body.pose
     cos, sin = np.cos(theta), np.sin(theta)

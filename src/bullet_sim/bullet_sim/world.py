@@ -12,14 +12,14 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from bullet_sim.catalogue import CasterSettings, OfficeTable
+from bullet_sim.catalogue import OfficeTable, UtilityCart
 from bullet_sim.client import BulletClient, Pose, Twist, yaw_quaternion
 from bullet_sim.errors import SimError, nearest
 from bullet_sim.furniture import Furniture
 from bullet_sim.prisms import FIXTURE_FRICTION, build_prism
 from bullet_sim.quiet import bullet
 from bullet_sim.scene import Room, Scene
-from bullet_sim.tables import build_table
+from bullet_sim.wheeled import build_on_casters
 
 Array = NDArray[np.float64]
 
@@ -77,14 +77,14 @@ class World:
     def _build(self, name: str, rng: Generator) -> Furniture:
         settings, concealed = self.scene.bodies[name], self.scene.concealed
         mass = concealed.mass.get(name)
-        if not isinstance(settings, OfficeTable):
+        if not isinstance(settings, OfficeTable | UtilityCart):
             return build_prism(self.client, name, settings, mass=mass)
         lever = concealed.rolling_resistance.get(name)
         if lever is not None:
-            make: CasterSettings = settings.casters.model_copy(update={"rolling_resistance": lever})
+            make = settings.casters.model_copy(update={"rolling_resistance": lever})
             settings = settings.model_copy(update={"casters": make})
-        locked = concealed.locked_casters.get(name, ())
-        return build_table(self.client, name, settings, rng, mass=mass, locked=locked)
+        locked, fixed = concealed.locked_casters.get(name, ()), concealed.fixed_wheels.get(name, ())
+        return build_on_casters(self.client, name, settings, rng, mass=mass, locked=locked, fixed=fixed)
 
     def step(self) -> None:
         """Advance by one physics step; forces applied since the last step act during this one."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from bullet_sim.catalogue import Body, Fixture, OfficeTable
+from bullet_sim.catalogue import Body, Fixture, OnCasters
 from bullet_sim.scene import Scene
 from krang_sim.observations import KnownBody, KnownScene
 
@@ -23,7 +23,7 @@ def known_scene(scene: Scene, time: float) -> KnownScene:
 
 
 def _known_body(name: str, body: Body) -> KnownBody:
-    swivels = list(body.swivels.values()) if isinstance(body, OfficeTable) else []
+    swivels = list(body.swivels.values()) if isinstance(body, OnCasters) else []
     built_in = isinstance(body, Fixture)
     return KnownBody(
         name=name,

@@ -49,6 +49,20 @@ class Likelihood(StrEnum):
     INTEGRATED = "integrated"
 
 
+class Sampler(StrEnum):
+    """Samplers of `fit`."""
+
+    IMPORTANCE = "importance"
+    METROPOLIS = "metropolis"
+
+
+class Engine(StrEnum):
+    """Engines of `fit`."""
+
+    KERNEL = "kernel"
+    PYMUNK = "pymunk"
+
+
 Seed = Annotated[int, typer.Option(min=0, help="Seed of every random draw; the same seed gives the same result.")]
 Out = Annotated[Path, typer.Option(help="Folder for the results.")]
 Bag = Annotated[Path, typer.Argument(help="Bag folder, .mcap file, or .csv with --map.")]
@@ -95,8 +109,16 @@ def fit(
         ),
     ] = "auto",
     likelihood: Annotated[Likelihood, typer.Option(help="How motion is compared.")] = Likelihood.WINDOWED,
+    sampler: Annotated[
+        Sampler,
+        typer.Option(help="importance: every mode, with an evidence; metropolis: block-wise chains, the thesis's way."),
+    ] = Sampler.IMPORTANCE,
+    engine: Annotated[
+        Engine, typer.Option(help="What simulates: the compiled kernel, or pymunk, the thesis's way and far slower.")
+    ] = Engine.KERNEL,
     draws: Annotated[
-        int | None, typer.Option(min=10, help="Posterior draws to keep from each chain. Default: the model's.")
+        int | None,
+        typer.Option(min=10, help="Posterior draws to keep from each of 4 chains, or a quarter of all. Default: 500."),
     ] = None,
     priors: Annotated[
         Path | None, typer.Option(help="YAML file of priors, as config/params/priors.yaml. Default: what stands there.")
@@ -111,6 +133,8 @@ def fit(
         out=out,
         model_class=model_class,
         likelihood=str(likelihood),
+        sampler=str(sampler),
+        engine=str(engine),
         draws=draws,
         priors=priors,
         seed=seed,
@@ -169,7 +193,9 @@ def info(bag: Bag, mapping: Mapping = None) -> int:
 
 @app.command(epilog="Example: ./pbrl bench wheel --quick")
 def bench(
-    name: Annotated[str, typer.Argument(help="sim, wheel, cabinet, recorder or mcap.")],
+    name: Annotated[
+        str, typer.Argument(help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose or calibration.")
+    ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,
     seed: Seed = 0,
     quick: Annotated[
@@ -178,6 +204,24 @@ def bench(
 ) -> int:
     """Measure one group of acceptance rows; the last line is the report as JSON."""
     return _hand_over("bench", name=name, out=out, seed=seed, quick=quick)
+
+
+@app.command(epilog="Example: ./pbrl experiment sample-efficiency --quick")
+def experiment(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="shopping-cart, shopping-cart-noisy, apartment, sample-efficiency, noise, robot-fits or contact."
+        ),
+    ],
+    out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/experiment/NAME.")] = None,
+    seed: Seed = 0,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A smaller version that still measures, under a minute.")
+    ] = False,
+) -> int:
+    """Repeat an experiment of the thesis; figure.png in the folder, the last line is the report as JSON."""
+    return _hand_over("experiment", name=name, out=out, seed=seed, quick=quick)
 
 
 def main() -> None:

@@ -8,6 +8,7 @@ plan and seed make the same bag, byte for byte.
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import singledispatchmethod
@@ -42,6 +43,7 @@ from pbrl_control.settings import ControllerSettings, load_section
 
 AFTERWARDS = 0.5  # [s] recorded after the end, so that tags that are under way arrive
 LONGEST = 180.0  # [s] of simulated time; a push that takes longer hangs
+FALLEN = math.radians(20.0)  # a body that ends further off level than this is not what a planar model is about
 
 
 @dataclass(frozen=True)
@@ -95,8 +97,21 @@ def simulate_push(
         # The name inside the bag is the folder's, so the folder is made under its own name elsewhere.
         with BagWriter(unfinished / bag.name, live=False) as writer:
             end = _run(_Run(session, plan, settings, writer), advance or (lambda time, phase: None))
+        fallen = fallen_body(session)
         (unfinished / bag.name).replace(bag)
-        return SimulatedPush(bag, str(end.phase), end.status, session.time, writer.message_count)
+        phase, status = (Phase.FAILED, fallen) if fallen else (end.phase, end.status)
+        return SimulatedPush(bag, str(phase), status, session.time, writer.message_count)
+
+
+def fallen_body(session: KrangSession) -> str:
+    """Say which body tipped over, or return nothing: its recording is no push of a body that stays on the floor."""
+    for name in session.world.furniture:
+        off = math.acos(max(-1.0, min(1.0, float(session.world.pose(name).matrix[2, 2]))))
+        if off > FALLEN:
+            return (
+                f"{name} tipped over, it ends {math.degrees(off):.0f} degrees off level; push it more gently or lower"
+            )
+    return ""
 
 
 def _check_fit(scene: Scene, plan: PushPlan) -> None:

@@ -32,6 +32,8 @@ def to_inference_data(posterior: Posterior) -> Any:
             "names": json.dumps(posterior.names),
             "base": json.dumps({name: _number(value) for name, value in asdict(posterior.base).items()}),
             "log_evidence": posterior.log_evidence,
+            "log_evidence_sd": posterior.log_evidence_sd,
+            "ess": posterior.ess,
             "heldout_rmse": posterior.heldout_rmse,
             "notes": json.dumps(posterior.notes),
         }
@@ -64,6 +66,8 @@ def from_inference_data(data: Any) -> Posterior:
             log_evidence=float(attributes["log_evidence"]),
             heldout_rmse=float(attributes["heldout_rmse"]),
             notes=tuple(map(str, json.loads(attributes["notes"]))),
+            log_evidence_sd=float(attributes.get("log_evidence_sd", math.nan)),
+            ess=float(attributes.get("ess", math.nan)),
         )
     except (KeyError, TypeError, ValueError) as error:
         what = " ".join(str(error).split())

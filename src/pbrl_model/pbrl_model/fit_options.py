@@ -6,12 +6,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from pbrl_model.engines import EngineName
 from pbrl_model.errors import ModelError
 from pbrl_model.gravity import GravityMethod
 from pbrl_model.parameters import nearest
 from pbrl_model.prior_options import PriorOptions
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+SamplerName = Literal["importance", "metropolis"]
 LikelihoodName = Literal["windowed", "one_step", "integrated"]
 
 
@@ -22,13 +24,17 @@ class FitOptions(BaseModel):
         model_class: what a body may have: nothing but mass, a wheel (the thesis's class), a wheel and friction of the
             whole body on the floor, or a hinge.
         likelihood: "windowed" (multiple shooting), "one_step" (thesis 25) or "integrated" (39).
+        sampler: "importance" (adaptive, from a mixture at the modes, with an evidence) or "metropolis" (block-wise
+            chains from the modes, as in the thesis).
+        engine: what simulates in the likelihood, "kernel" (compiled) or "pymunk" (as in the thesis, some hundred times
+            slower). Modes are sought on the kernel either way; the posterior is the engine's.
         objects: names to learn; empty: every object that was held.
         priors: settings of table 2's priors.
         window: length of a window [s].
-        draws: kept from each chain.
+        draws: kept from each chain; importance sampling returns as many as all chains together.
         chains: how many.
-        burn_in: steps of each chain in which it adapts.
-        thin: steps for each draw kept.
+        burn_in: steps of each chain in which it adapts; Metropolis only.
+        thin: steps for each draw kept; Metropolis only.
         search_draws: draws from the prior that the search starts with.
         seed: of every random draw.
         holdout_share: share of the windows that is left out of the fit and predicted; 0: none.
@@ -45,6 +51,8 @@ class FitOptions(BaseModel):
 
     model_class: Literal["free", "wheel", "wheel+ground", "hinge"] = "wheel+ground"
     likelihood: LikelihoodName = "windowed"
+    sampler: SamplerName = "importance"
+    engine: EngineName = "kernel"
     objects: tuple[str, ...] = ()
     priors: PriorOptions = PriorOptions()
     window: Annotated[float, Field(ge=0.2, le=60.0)] = 1.5

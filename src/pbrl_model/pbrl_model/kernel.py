@@ -1,4 +1,4 @@
-"""The compiled world model: one body with a wheel and a distance joint, many rollouts in one call.
+"""The compiled world model: one body with a wheel and a distance joint, and the mathematics of its step.
 
 A step is Chipmunk's `cpSpaceStep`, in its order: the pose advances with the old velocity; the
 constraints are laid out at the new pose; the wrench changes the velocity; then impulses are sought
@@ -12,9 +12,12 @@ such that each constraint holds or is at its limit. The constraints are
 Chipmunk finds the impulses by Gauss-Seidel sweeps with accumulated clamping, warm-started. They converge
 to the one minimum of a quadratic in a box. With one body there are two rows in the box (the wheel) and at most two
 unlimited ones (the joint), so the minimum has a closed form: the joint's rows are eliminated and the
-2 x 2 rest is solved by cases. That is what this file does; it is what Chipmunk tends to as its iterations
+2 x 2 rest is solved (`box_impulses`). That is what this file does; it is what Chipmunk tends to as its iterations
 grow, and a converged solution needs no warm start. `world.py` is the readable reference and the tests
 hold the two to each other.
+
+`integrate` is the plain loop, for one body. `lane_kernel.py` is the same step for many bodies at once, several times as
+fast; what rolls out many does so in lanes.
 
 Last comes the friction of the whole body on the floor (feet that slide, casters that resist rolling), which
 Chipmunk does not have: all three velocities shrink by the same share, such that sqrt(v^2 + omega^2 I/m) falls by
@@ -33,7 +36,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -43,50 +46,70 @@ GRAVITY = 9.81  # [m/s^2]
 ERROR_BIAS = float(np.float32(1.0) - np.float32(0.1)) ** 60.0
 MIN_DISTANCE = 1e-9  # [m] nearer to the hinge than this a distance joint has no direction and rests for the step
 SINGULAR = 1e-12  # a 2 x 2 matrix with a smaller determinant than this share of its diagonal's product is singular
+# A quarter turn in three parts of which the first two have so few digits that whole multiples of them are exact.
+QUARTER = (1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624871116645580e-21)
+SIN = (
+    -1.66666666666666324348e-01,
+    8.33333333332248946124e-03,
+    -1.98412698298579493134e-04,
+    2.75573137070700676789e-06,
+    -2.50507602534068634195e-08,
+    1.58969099521155010221e-10,
+)
+COS = (
+    4.16666666666666019037e-02,
+    -1.38888888888741095749e-03,
+    2.48015872894767294178e-05,
+    -2.75573143513906633035e-07,
+    2.08757232129817482790e-09,
+    -1.13596475577881948265e-11,
+)
 MASS, WHEEL_X, WHEEL_Y, WHEEL_THETA, MU_X, MU_Y, HINGE_X, HINGE_Y, HINGE_RADIUS, ANCHOR_X, ANCHOR_Y, MU_GROUND = range(
     12
 )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def clamp(value: float, limit: float) -> float:
     """Return the value, brought into [-limit, limit]."""
     return min(max(value, -limit), limit)
 
 
-@njit(cache=True, error_model="numpy")
-def edge_impulses(
-    own: float, cross: float, other: float, b_own: float, b_other: float, limit_own: float, limit_other: float
-) -> tuple[float, float, float]:
-    """Put one row at whichever of its limits fits best; return (own impulse, other impulse, violation).
+@njit(cache=True, error_model="numpy", forceinline=True)
+def cos_sin(angle: float) -> tuple[float, float]:
+    """Return cosine and sine, both within 2.3e-16 for angles up to 1e6 rad, by multiplications and choices alone.
 
-    Violation is by how much the remaining velocity along the own row contradicts the limit: at the upper
-    limit it may not be positive, at the lower not negative.
+    The angle is brought into [-pi/4, pi/4] by whole quarter turns taken off in three parts (Cody and Waite), there the
+    polynomials of the fdlibm library hold, and the quarter turns decide which is which and the signs. The
+    library's own functions cannot work on several numbers at once.
     """
-    best, best_other, least = 0.0, 0.0, math.inf
-    for side in range(2):
-        impulse = limit_own if side == 0 else -limit_own
-        rest = b_other + cross * impulse
-        answer = clamp(-rest / other, limit_other) if other > 0.0 else -math.copysign(limit_other, rest)
-        slip = b_own + own * impulse + cross * answer
-        violation = slip if side == 0 else -slip
-        if violation < least:
-            best, best_other, least = impulse, answer, violation
-    return best, best_other, least
+    turns = math.floor(angle * (2.0 / math.pi) + 0.5)
+    rest = ((angle - turns * QUARTER[0]) - turns * QUARTER[1]) - turns * QUARTER[2]
+    z = rest * rest
+    sine = rest + rest * z * (SIN[0] + z * (SIN[1] + z * (SIN[2] + z * (SIN[3] + z * (SIN[4] + z * SIN[5])))))
+    cosine = 1.0 - 0.5 * z + z * z * (COS[0] + z * (COS[1] + z * (COS[2] + z * (COS[3] + z * (COS[4] + z * COS[5])))))
+    half = math.floor(0.5 * turns)
+    odd = turns - 2.0 * half
+    sign = 1.0 - 2.0 * (half - 2.0 * math.floor(0.5 * half))
+    c = sine if odd > 0.5 else cosine
+    s = cosine if odd > 0.5 else sine
+    return c * (sign * (1.0 - 2.0 * odd)), s * sign
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def box_impulses(
     a00: float, a01: float, a11: float, b0: float, b1: float, limit0: float, limit1: float
 ) -> tuple[float, float]:
     """Minimise p.A.p / 2 + b.p over |p_i| <= limit_i: the impulses two sweeping rows converge to.
 
-    Either both rows stick (the free minimum lies in the box), or one of them is at a limit; then the
-    other's impulse is its own free minimum, clamped. The case whose remaining velocity agrees with its
-    limit is the answer; rounding can leave none exactly so, hence the least violation is taken.
+    For a given p0 the best p1 is that of row 1 alone, brought into its limits: the middle one of its free value and
+    the two limits. So what is left along row 0, g(p0) = a00 p0 + a01 p1(p0) + b0, is the middle one of three straight
+    lines that all rise with p0: row 1 sticking, or sliding at either limit. The root of the middle one of rising lines
+    is the middle one of their roots. Then p0 is brought into its limits, for the problem that is left is convex in p0.
+    No case is tried and rejected, so that many can be worked out at once.
 
     Args:
-        a00: [1/kg] what an impulse of row 0 does to the velocity along row 0; `a01`, `a11` likewise.
+        a00: [1/kg] what an impulse of row 0 does to the velocity along row 0, above zero; `a01`, `a11` likewise.
         a01: see `a00`.
         a11: see `a00`.
         b0: [m/s] velocity along row 0 without the impulses.
@@ -97,20 +120,12 @@ def box_impulses(
     Returns:
         The two impulses [N s].
     """
-    determinant = a00 * a11 - a01 * a01
-    if determinant > SINGULAR * a00 * a11:
-        scale = 1.0 / determinant
-        p0 = (a01 * b1 - a11 * b0) * scale
-        p1 = (a01 * b0 - a00 * b1) * scale
-        if abs(p0) <= limit0 and abs(p1) <= limit1:
-            return p0, p1
-    first0, first1, violation_first = edge_impulses(a00, a01, a11, b0, b1, limit0, limit1)
-    if violation_first <= 0.0:
-        return first0, first1
-    second1, second0, violation_second = edge_impulses(a11, a01, a00, b1, b0, limit1, limit0)
-    if violation_second < violation_first:
-        return second0, second1
-    return first0, first1
+    # Rows all but parallel: the sticking root then lies far out on its proper side, or anywhere if it does not matter.
+    determinant = max(a00 * a11 - a01 * a01, SINGULAR * a00 * a11)
+    stick = (a01 * b1 - a11 * b0) / determinant
+    slide, reach = -b0 / a00, abs(a01) * limit1 / a00
+    p0 = clamp(min(max(stick, slide - reach), slide + reach), limit0)
+    return p0, clamp(-(b1 + a01 * p0) / a11, limit1)
 
 
 @njit(cache=True, error_model="numpy")
@@ -160,6 +175,7 @@ def integrate(
     origin_x: float,
     origin_y: float,
     dt: float,
+    body_wrench: bool,
     out: Array,
 ) -> None:
     """Roll one body out and write its motion.
@@ -176,6 +192,7 @@ def integrate(
             mass itself, `com_x` for the origin of the body's frame.
         origin_y: as `origin_x`.
         dt: [s].
+        body_wrench: whether the wrench's force is in the body's axes, carried along with the simulated heading.
         out: (>= steps + 1, 3) poses, or (.., 6) with velocities of the centre of mass; rows 0..steps are written.
     """
     inverse_mass = 1.0 / parameters[MASS]
@@ -205,7 +222,7 @@ def integrate(
     n0x = n0y = l0 = n1x = n1y = l1 = h00 = h01 = h11 = 0.0
     g00 = g01 = g10 = g11 = 0.0  # impulse along each joint row (first index) that answers one along each wheel row
 
-    c, s = math.cos(theta), math.sin(theta)
+    c, s = cos_sin(theta)
     for t in range(steps + 1):
         out[t, 0] = x - c * origin_x + s * origin_y
         out[t, 1] = y - s * origin_x - c * origin_y
@@ -217,9 +234,12 @@ def integrate(
         x += vx * dt
         y += vy * dt
         theta += omega * dt
-        c, s = math.cos(theta), math.sin(theta)
-        vx += wrench[t, 0] * inverse_mass * dt
-        vy += wrench[t, 1] * inverse_mass * dt
+        c, s = cos_sin(theta)
+        fx, fy = wrench[t, 0], wrench[t, 1]
+        if body_wrench:
+            fx, fy = c * fx - s * fy, s * fx + c * fy
+        vx += fx * inverse_mass * dt
+        vy += fy * inverse_mass * dt
         omega += wrench[t, 2] * inverse_inertia * dt
 
         ex, ey = c * wheel_c - s * wheel_s, s * wheel_c + c * wheel_s
@@ -249,6 +269,7 @@ def integrate(
         if wheel:
             slip0 = ex * vx + ey * vy + lever0 * omega
             slip1 = ex * vy - ey * vx + lever1 * omega
+            k00, k11 = max(k00, SINGULAR * a00), max(k11, SINGULAR * a11)
             p0, p1 = box_impulses(k00, k01, k11, slip0, slip1, limit0, limit1)
             j0, j1 = g00 * p0 + g01 * p1, g10 * p0 + g11 * p1
             vx += (ex * p0 - ey * p1 + n0x * j0 + n1x * j1) * inverse_mass
@@ -260,72 +281,3 @@ def integrate(
             vx *= kept
             vy *= kept
             omega *= kept
-
-
-@njit(cache=True, error_model="numpy")
-def rollout_one(
-    parameters: Array,
-    initial: Array,
-    wrench: Array,
-    steps: NDArray[np.int64],
-    inertia_per_mass: float,
-    com: Array,
-    origin: Array,
-    dt: float,
-    index: int,
-    out: Array,
-) -> None:
-    """Roll out pair number `index` of (parameter row, window); NaN past the window's own end."""
-    windows = wrench.shape[0]
-    p, w = index // windows, index % windows
-    start = initial[p if initial.shape[0] > 1 else 0, w]
-    integrate(
-        parameters[p], start, wrench[w], steps[w], inertia_per_mass, com[0], com[1], origin[0], origin[1], dt, out[p, w]
-    )
-    out[p, w, steps[w] + 1 :] = np.nan
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def rollout_serial(
-    parameters: Array,
-    initial: Array,
-    wrench: Array,
-    steps: NDArray[np.int64],
-    inertia_per_mass: float,
-    com: Array,
-    origin: Array,
-    dt: float,
-    out: Array,
-) -> None:
-    """Roll out every parameter row over every window on this core.
-
-    Args:
-        parameters: (P, 12) rows of `KERNEL_COLUMNS`.
-        initial: (P, W, 6), or (1, W, 6) for one start for all rows.
-        wrench: (W, T, 3).
-        steps: (W,) steps of each window, at most T.
-        inertia_per_mass: [m^2].
-        com: (2,) centre of mass in the body's frame [m].
-        origin: (2,) zero to write the centre of mass, `com` to write the body's frame origin.
-        dt: [s].
-        out: (P, W, T + 1, 3 or 6), written.
-    """
-    for index in range(parameters.shape[0] * wrench.shape[0]):
-        rollout_one(parameters, initial, wrench, steps, inertia_per_mass, com, origin, dt, index, out)
-
-
-@njit(cache=True, error_model="numpy", nogil=True, parallel=True)
-def rollout_parallel(
-    parameters: Array,
-    initial: Array,
-    wrench: Array,
-    steps: NDArray[np.int64],
-    inertia_per_mass: float,
-    com: Array,
-    origin: Array,
-    dt: float,
-    out: Array,
-) -> None:
-    """Do what `rollout_serial` does on all cores; each pair is its own work, so the bytes are the same."""
-    for index in prange(parameters.shape[0] * wrench.shape[0]):
-        rollout_one(parameters, initial, wrench, steps, inertia_per_mass, com, origin, dt, index, out)

@@ -3,14 +3,15 @@
 In each window the simulated poses depend on the start state and on whatever the model leaves out. Both are
 nuisances z with a Gaussian prior: the start from the smoother, and a wrench that is constant over a window in the
 body's axes, as a rolling resistance or a sensor's bias is. To first order the residual is r(phi) - S z, with S from
-finite differences on the kernel, so that
+finite differences on the simulation, so that
 
     r ~ Normal(0, sigma^2 R + S Q S^T),    Q = diag(P0, drag^2 (1, 1, lever^2)),
 
 R from the noise of the poses as the smoother found it, sigma a scale that lets model error widen it, one for each
 object (thesis 29), drag the size of the left-out force [N]. A left-out force of some newtons bends a window of two
-seconds more than a line can follow, so S is taken at the most likely nuisances of a mode (Gauss-Newton), and frozen
-there while sampling.
+seconds more than a line can follow, so S is taken at the most likely nuisances (Gauss-Newton): `marginal` finds them
+anew for every row, compiled; a Metropolis chain keeps those of the mode it began at, ten times cheaper.
+One more unknown is common to all windows and no Gaussian: how late the poses come after the wrenches.
 With P0 = 0 and drag = 0 this is the thesis's likelihood: (25) over one-step windows, (39) over whole episodes.
 """
 
@@ -23,20 +24,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_model.engines import SERIAL_STEPS, KernelEngine, MakeEngine, lever
 from pbrl_model.geometry import MassProperties
+from pbrl_model.marginal_kernel import FORCE_STEP, NUISANCES, START_STEP, marginal_parallel, marginal_serial
 from pbrl_model.rollout import KERNEL_LOCK
-from pbrl_model.window_kernel import simulate_parallel, simulate_serial
 from pbrl_model.windows import Windows
 
 Array = NDArray[np.float64]
 
-SERIAL_STEPS = 40_000
-"""Below this many body steps in all, waking the other cores costs more than it saves."""
-START_STEP = 0.1
-"""Finite difference in the start state, in standard deviations of its prior."""
-FORCE_STEP = 0.2
-"""Finite difference in the left-out force [N]; times the lever for the torque."""
-NUISANCES = 9
+ROUNDS = 4
+"""Linearisations at most on the way to the most likely nuisances of a window."""
 
 
 @dataclass(frozen=True)
@@ -68,13 +65,22 @@ class WindowedLikelihood:
         body: centre of mass and inertia over mass.
         windows: what was recorded.
         with_drag: whether a constant wrench of unknown size is left out in each window.
+        make_engine: of what simulates.
     """
 
-    def __init__(self, body: MassProperties, windows: Windows, *, with_drag: bool = True) -> None:
+    def __init__(
+        self,
+        body: MassProperties,
+        windows: Windows,
+        *,
+        with_drag: bool = True,
+        make_engine: MakeEngine = KernelEngine,
+    ) -> None:
         self.body = body
-        self.lever = math.sqrt(body.inertia_per_mass)  # turns a force scale into a torque scale [m]
+        self.lever = lever(body)
         self.windows = windows
         self.with_drag = with_drag
+        self.engine = make_engine(body, windows)
         self._count = np.array([int(seen.sum()) for seen in windows.seen])
         self._weight = windows.seen / windows.noise[:, None, :]
         self._log_noise = float(np.sum(windows.seen * np.log(windows.noise)[:, None, :]))
@@ -82,64 +88,48 @@ class WindowedLikelihood:
         self._root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
         self._free_start = bool(np.any(windows.covariance))
         self.has_nuisance = with_drag or self._free_start
+        self._constant = -0.5 * float(self._count.sum()) * math.log(2 * np.pi) - self._log_noise
+
+    def with_engine(self, make_engine: MakeEngine) -> WindowedLikelihood:
+        """Return the same likelihood with another simulation behind it."""
+        return WindowedLikelihood(self.body, self.windows, with_drag=self.with_drag, make_engine=make_engine)
 
     def at_rest(self, count: int) -> Array:
         """Return nuisances (count, W, 9) of zero: the start as smoothed, nothing left out."""
         return np.zeros((count, len(self.windows), NUISANCES))
 
-    def simulate(self, rows: Array, nuisance: Array) -> Array:
+    def simulate(self, rows: Array, nuisance: Array, delay: Array | None = None) -> Array:
         """Return (P, W, N, 3) simulated poses at the recorded times.
 
         Args:
             rows: (P, 12) kernel rows.
             nuisance: (P, W, 9), see `Linearisation`.
+            delay: (P,) by how much poses come after wrenches [s]; None: as the windows were made for.
         """
-        w = self.windows
-        initial = w.initial + np.einsum("wkl,pwl->pwk", self._root, nuisance[..., :6])
-        offset = nuisance[..., 6:] * np.array([1.0, 1.0, self.lever])
-        out = np.empty((len(rows), len(w), w.step.shape[1], 3))
-        arguments = (
-            np.ascontiguousarray(rows),
-            initial,
-            np.ascontiguousarray(offset),
-            w.heading,
-            w.wrench,
-            w.steps,
-            w.step,
-            w.fraction,
-            self.body.inertia_per_mass,
-            self.body.com,
-            w.dt,
-            out,
-        )
-        if len(rows) * int(w.steps.sum()) > SERIAL_STEPS:
-            with KERNEL_LOCK:
-                simulate_parallel(*arguments)
-        else:
-            simulate_serial(*arguments)
-        return out
+        initial = self.windows.initial + np.einsum("wkl,pwl->pwk", self._root, nuisance[..., :6])
+        return self.engine.poses(rows, initial, nuisance[..., 6:], self._late(rows, delay))
 
-    def residuals(self, rows: Array, nuisance: Array, base: Array | None = None) -> Array:
+    def _late(self, rows: Array, delay: Array | None) -> Array:
+        return np.zeros(len(rows)) if delay is None else delay - self.windows.delay
+
+    def residuals(self, rows: Array, nuisance: Array, delay: Array | None = None, base: Array | None = None) -> Array:
         """Return (P, W, 3N) recorded minus simulated over noise, angles wrapped, zero where nothing was seen.
 
         Args:
             rows: (P, 12) kernel rows.
             nuisance: (P, W, 9).
-            base: (P, W, N, 3) result of `simulate(rows, nuisance)`, where it is at hand.
+            delay: (P,) see `simulate`.
+            base: (P, W, N, 3) result of `simulate`, where it is at hand.
         """
-        difference = self.windows.pose - (self.simulate(rows, nuisance) if base is None else base)
+        difference = self.windows.pose - (self.simulate(rows, nuisance, delay) if base is None else base)
         difference[..., 2] -= 2 * np.pi * np.round(difference[..., 2] / (2 * np.pi))
         return (difference * self._weight).reshape(len(rows), len(self.windows), -1)
 
-    def linearise(self, rows: Array, nuisance: Array, base: Array | None = None) -> Linearisation:
-        """Take differences in every nuisance.
-
-        Args:
-            rows: (P, 12) kernel rows.
-            nuisance: (P, W, 9).
-            base: (P, W, N, 3) result of `simulate(rows, nuisance)`, where it is at hand.
-        """
-        base = self.simulate(rows, nuisance) if base is None else base
+    def linearise(
+        self, rows: Array, nuisance: Array, delay: Array | None = None, base: Array | None = None
+    ) -> Linearisation:
+        """Take differences in every nuisance; arguments as of `residuals`."""
+        base = self.simulate(rows, nuisance, delay) if base is None else base
         out = np.zeros((*base.shape[:2], base.shape[2] * 3, NUISANCES))
         for k in range(NUISANCES):
             if not (self.with_drag if k >= 6 else self._free_start):
@@ -147,9 +137,54 @@ class WindowedLikelihood:
             step = FORCE_STEP if k >= 6 else START_STEP
             moved = nuisance.copy()
             moved[..., k] += step
-            change = (self.simulate(rows, moved) - base) * (self._weight / step)
+            change = (self.simulate(rows, moved, delay) - base) * (self._weight / step)[None]
             out[..., k] = change.reshape(*base.shape[:2], -1)
         return Linearisation(nuisance, out)
+
+    def marginal(
+        self, rows: Array, sigma: Array, drag: Array, delay: Array, nuisance: Array, *, rounds: int = ROUNDS
+    ) -> Array:
+        """Return (P,) log likelihoods, each linearised at its own most likely nuisances; compiled, kernel only.
+
+        Args:
+            rows: (P, 12) kernel rows.
+            sigma: (P,) scale of the pose noise.
+            drag: (P,) scale of the left-out force [N].
+            delay: (P,) see `simulate`.
+            nuisance: (P, W, 9) where the climb begins; moved to where it ends.
+            rounds: linearisations at most; 1: at `nuisance`, which stays.
+
+        Raises:
+            TypeError: the engine is not the kernel.
+        """
+        engine = self.engine
+        if not isinstance(engine, KernelEngine):
+            raise TypeError(f"marginal: expected the kernel as engine, got {type(engine).__name__}")
+        out = np.empty(len(rows))
+        arguments = (
+            np.ascontiguousarray(rows),
+            self.windows.initial,
+            self._root,
+            drag,
+            sigma,
+            self._late(rows, delay),
+            engine.forcing,
+            self.windows.steps,
+            engine.place,
+            engine.constants,
+            self.windows.pose,
+            self._weight,
+            self.with_drag,
+            rounds,
+            nuisance,
+            out,
+        )
+        if len(rows) > 1 and NUISANCES * len(rows) * int(self.windows.steps.sum()) > SERIAL_STEPS:
+            with KERNEL_LOCK:
+                marginal_parallel(*arguments)
+        else:
+            marginal_serial(*arguments)
+        return out + self._constant
 
     def best_nuisance(self, residuals: Array, linear: Linearisation, sigma: Array, drag: Array) -> Array:
         """Return (P, W, 9) the most likely nuisances, to linearise again at.
@@ -190,10 +225,9 @@ class WindowedLikelihood:
             (P,) with the windows' own constants, so that different models can be compared.
         """
         variance = sigma[:, None] ** 2
-        constant = -0.5 * self._count.sum() * math.log(2 * np.pi) - self._log_noise
         if not self.has_nuisance:
             squares = np.sum(residuals**2, axis=-1)
-            return constant - 0.5 * np.sum(squares / variance + self._count * np.log(variance), axis=-1)
+            return self._constant - 0.5 * np.sum(squares / variance + self._count * np.log(variance), axis=-1)
         offset = self._centred(residuals, linear)
         scale = self._scale(drag)
         inner = linear.gram * (scale[:, None, :, None] * scale[:, None, None, :])
@@ -204,7 +238,7 @@ class WindowedLikelihood:
         quadratic = (np.sum(offset**2, axis=-1) - np.sum(half**2, axis=-1)) / variance
         log_det = 2 * np.sum(np.log(np.diagonal(factor, axis1=-2, axis2=-1)), axis=-1)
         log_det = log_det + (self._count - NUISANCES) * np.log(variance)
-        return constant - 0.5 * np.sum(quadratic + log_det, axis=-1)
+        return self._constant - 0.5 * np.sum(quadratic + log_det, axis=-1)
 
     def normal_equations(
         self, residuals: Array, derivatives: Array, linear: Linearisation, sigma: Array, drag: Array

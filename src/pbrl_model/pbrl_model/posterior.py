@@ -25,7 +25,9 @@ class Posterior:
         names: K names among `KERNEL_COLUMNS`.
         draws: (chains, n, K), read-only.
         base: values of the parameters that were not learned.
-        log_evidence: [nat]; NaN where it was not computed.
+        log_evidence: [nat]; NaN where it was not computed or did not converge.
+        log_evidence_sd: its standard error [nat]; NaN likewise.
+        ess: effective samples behind the draws, where they were weighted; NaN for chains, which are asked themselves.
         heldout_rmse: position error on windows left out of the fit [m]; NaN where none were.
         notes: what the data do not say, in sentences.
     """
@@ -38,6 +40,8 @@ class Posterior:
     log_evidence: float = math.nan
     heldout_rmse: float = math.nan
     notes: tuple[str, ...] = ()
+    log_evidence_sd: float = math.nan
+    ess: float = math.nan
 
     def __post_init__(self) -> None:
         draws = np.array(self.draws, dtype=float)

@@ -7,7 +7,7 @@ for the first state of each window, while the poses that the likelihood sees sta
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,7 @@ class Motion:
         covariance: (T + 1, 6, 6) of `state`.
         noise: (3,) standard deviation of one recorded pose [m, m, rad], as the smoother found it.
         oriented: whether the orientation was observed.
+        delay: by how much the wrenches were shifted to be as late as the poses [s].
     """
 
     object: str
@@ -59,6 +60,7 @@ class Motion:
     covariance: Array
     noise: Array
     oriented: bool
+    delay: float = 0.0
 
 
 def _within(stream: PoseStream, start: float, end: float, what: str) -> PoseStream:
@@ -133,13 +135,14 @@ def _grasp_of(recording: Recording, gripper: str, name: str, start: float) -> tu
 
 
 def _gripper_wrench(
-    recording: Recording, gripper: str, name: str, grid: Array, state: Array, gravity: GravityMethod
+    recording: Recording, gripper: str, name: str, grid: Array, state: Array, gravity: GravityMethod, delay: float
 ) -> Array:
     """Return (T, 3) what one gripper exerts on the object, at its centre of mass in world axes."""
     what = f"wrench of {gripper} gripper"
     if gripper not in recording.wrenches:
         raise ModelError(f"{what}: expected a stream, the recording has {sorted(recording.wrenches) or 'none'}")
     stream = recording.wrenches[gripper]
+    stream = replace(stream, time=stream.time + delay) if delay else stream
     readings = _checked_wrench(stream, grid, what)
     middle = 0.5 * (grid[1:] + grid[:-1])
     centre = np.concatenate([0.5 * (state[1:, :2] + state[:-1, :2]), np.zeros((len(middle), 1))], -1)
@@ -204,6 +207,7 @@ def observe(
     *,
     dt: float = 0.01,
     gravity: GravityMethod = "weight",
+    delay: float = 0.0,
 ) -> Motion:
     """Bring everything that is known of one episode to one clock.
 
@@ -216,6 +220,7 @@ def observe(
         com: (2,) centre of mass in the object's frame [m]; zero where the orientation is not observed.
         dt: grid step [s].
         gravity: how raw wrenches are compensated, see `pbrl_model.gravity`.
+        delay: by how much the cameras' poses come after the wrenches [s]; the wrenches are made as late.
 
     Raises:
         ModelError: a stream is missing, has gaps or is not finite, or the episode is shorter than a few poses.
@@ -237,9 +242,20 @@ def observe(
         [stream.position[:, :2], heading[:, None] if oriented else np.full((len(heading), 1), np.nan)], -1
     )
     wrench = sum(
-        (_gripper_wrench(recording, gripper, name, grid, state, gravity) for gripper in grippers),
+        (_gripper_wrench(recording, gripper, name, grid, state, gravity, delay) for gripper in grippers),
         start=np.zeros((steps, 3)),
     )
     return Motion(
-        name, tuple(grippers), dt, grid, wrench, stream.time[inside], pose[inside], state, covariance, noise, oriented
+        name,
+        tuple(grippers),
+        dt,
+        grid,
+        wrench,
+        stream.time[inside],
+        pose[inside],
+        state,
+        covariance,
+        noise,
+        oriented,
+        delay,
     )

@@ -23,8 +23,11 @@ from pbrl_model.windows import shooting_windows
 
 Array = NDArray[np.float64]
 
-FIRST_NOISE = (np.log(2.0), np.log(4.0))
-"""ln sigma and ln drag while draws are compared: generous, for none of them is right yet."""
+FIRST_NOISE = (0.0, np.log(2.0), np.log(4.0))
+"""Delay, ln sigma and ln drag while draws are compared: generous, for none of them is right yet."""
+AGAIN = 8
+"""Iterations of a climb that starts near its end."""
+SCALE_DRAWS = 400
 DISTINCT = 0.15
 """Positions nearer than this share of the prior's spread in every feature are one."""
 
@@ -75,7 +78,8 @@ def find_modes(rng: np.random.Generator, target: Target, motions: Sequence[Motio
     Args:
         rng: source of randomness.
         target: log density over its final windows.
-        motions: that the windows were cut from, to cut shorter ones.
+        motions: that the windows were cut from, to cut shorter ones and to guess from; may be none where no stage has
+            shorter windows.
         plan: effort.
 
     Returns:
@@ -86,28 +90,41 @@ def find_modes(rng: np.random.Generator, target: Target, motions: Sequence[Motio
     """
     names, body = target.names, target.likelihood.body
     draws = target.prior.sample(rng, plan.draws)
-    spread = np.maximum(draws.std(axis=0), 1e-9)
-    apart = np.maximum(wheel_features(draws, names).std(axis=0), 1e-9)
+    apart = _apart(target, draws)
 
     def best(found: Array, value: Array, count: int) -> NDArray[np.int64]:
         return distinct(wheel_features(found[:, : len(names)], names), value, apart, count)
 
-    informed = guesses(names, motions, body.com, target.prior.sample(rng, max(plan.draws // 20, 8)))
-    physics = np.concatenate([draws, _inside(target, informed)])
+    physics = draws
+    if motions:
+        informed = guesses(names, motions, body.com, target.prior.sample(rng, max(plan.draws // 20, 8)))
+        physics = np.concatenate([draws, _inside(target, informed)])
     position = np.concatenate([physics, np.tile(FIRST_NOISE, (len(physics), 1))], -1)
-    first = True
-    for length, keep, iterations in zip(plan.lengths, plan.keep, plan.iterations, strict=False):
-        windows = shooting_windows(motions, length)
-        stage = target.over(WindowedLikelihood(body, windows, with_drag=target.likelihood.with_drag))
-        if first:
-            rows = best(position, stage.full_log_density(position), keep)
-            if len(rows) == 0:
-                raise ModelError("search: expected a draw of the prior with finite density, got none; check the priors")
-            position, first = position[rows], False
-        modes = polish(stage, position, spread, iterations=iterations)
-        position = modes.point.position[best(modes.point.position, modes.point.log_density, keep)]
-    modes = polish(target, position[: plan.keep[-1]], spread, iterations=plan.iterations[-1])
-    return modes.take(best(modes.point.position, modes.point.log_density, len(position)))
+    shorter = [shooting_windows(motions, length) for length in plan.lengths]
+    with_drag = target.likelihood.with_drag
+    stages = [*(target.over(WindowedLikelihood(body, windows, with_drag=with_drag)) for windows in shorter), target]
+    rows = best(position, stages[0].full_log_density(position, rounds=1), plan.keep[0])
+    if len(rows) == 0:
+        raise ModelError("search: expected a draw of the prior with finite density, got none; check the priors")
+    position = position[rows]
+    for stage, keep, iterations in zip(stages, plan.keep, plan.iterations, strict=True):
+        modes = polish(stage, position[:keep], iterations=iterations)
+        modes = modes.take(best(modes.point.position, modes.point.log_density, keep))
+        position = modes.point.position
+    return modes
+
+
+def climb_again(rng: np.random.Generator, target: Target, modes: Modes) -> Modes:
+    """Climb from modes of a target to those of another that is nearly the same, and merge what has become one."""
+    apart = _apart(target, target.prior.sample(rng, SCALE_DRAWS))
+    found = polish(target, modes.point.position, iterations=AGAIN)
+    features = wheel_features(found.point.position[:, : len(target.names)], target.names)
+    return found.take(distinct(features, found.point.log_density, apart, len(features)))
+
+
+def _apart(target: Target, draws: Array) -> Array:
+    """Return the prior's spread in the features that tell wheels apart (K,)."""
+    return np.maximum(wheel_features(draws, target.names).std(axis=0), 1e-9)
 
 
 def _inside(target: Target, physics: Array) -> Array:

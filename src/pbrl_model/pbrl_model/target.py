@@ -1,7 +1,8 @@
 """The density that is searched and sampled: prior times likelihood over physics and noise (27), object-wise (29).
 
-A position is one row: the learned parameters in the order of `names`, then ln sigma (scale of the pose noise) and
-ln drag (left-out force [N]).
+A position is one row: the learned parameters in the order of `names`, then the delay (how late the poses come after
+the wrenches [s]), ln sigma (scale of the pose noise) and ln drag (left-out force [N]). All but the last two, which
+only scale, change what is simulated.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_model.likelihood import Linearisation, WindowedLikelihood
+from pbrl_model.engines import KernelEngine
+from pbrl_model.likelihood import ROUNDS, Linearisation, WindowedLikelihood
+from pbrl_model.marginal_kernel import SETTLED
 from pbrl_model.parameters import KERNEL_COLUMNS, BodyParameters, expand
 from pbrl_model.priors import Prior
 
@@ -28,7 +31,9 @@ LEFT_OUT_BESIDE_GROUND = 1.0
 LOG_DRAG_SPREAD = 0.2
 """Standard deviation of ln drag. Narrow on purpose: with a free scale, a model that explains a resistance by a wheel
 that slides somewhere else would be preferred to one that leaves the resistance out in every window."""
-NOISE_NAMES = ("log_sigma", "log_drag")
+DELAY = 0.05
+"""Standard deviation of the poses' delay after the wrenches [s]: a camera's exposure and its detector."""
+NOISE_NAMES = ("delay", "log_sigma", "log_drag")
 SETTLE_SHARES = (1.0, 0.4, 0.1)
 """Steps towards the most likely nuisances that are tried in every window."""
 CHUNK_VALUES = 4_000_000
@@ -81,6 +86,21 @@ class Target:
         """Return the length of a position."""
         return len(self.names) + len(NOISE_NAMES)
 
+    @property
+    def simulated(self) -> int:
+        """Return how many of a position's first columns change what is simulated: the parameters and the delay."""
+        return len(self.names) + 1
+
+    @property
+    def bounds(self) -> Array:
+        """Lower and upper ends of the support of the simulated columns, (2, K + 1)."""
+        return np.column_stack([self.prior.bounds, [-np.inf, np.inf]])
+
+    @property
+    def periodic(self) -> NDArray[np.bool_]:
+        """Which of the simulated columns live on a circle, (K + 1,)."""
+        return np.append(self.prior.periodic, False)
+
     def over(self, likelihood: WindowedLikelihood) -> Target:
         """Return the same target over other windows."""
         return replace(self, likelihood=likelihood)
@@ -92,21 +112,37 @@ class Target:
             rows[:, KERNEL_COLUMNS.index(copy)] = rows[:, KERNEL_COLUMNS.index(source)]
         return rows
 
+    @property
+    def _noise_prior(self) -> tuple[Array, Array]:
+        """Return means and standard deviations of delay, ln sigma and ln drag."""
+        return np.array([0.0, LOG_SIGMA[0], math.log(self.left_out_force)]), np.array(
+            [DELAY, LOG_SIGMA[1], LOG_DRAG_SPREAD]
+        )
+
     def log_prior(self, position: Array) -> Array:
         """Return (P,) log prior of positions."""
-        noise = position[:, len(self.names) :]
-        means = np.array([LOG_SIGMA[0], math.log(self.left_out_force)])
-        deviations = np.array([LOG_SIGMA[1], LOG_DRAG_SPREAD])
-        normal = -0.5 * np.sum(((noise - means) / deviations) ** 2 + np.log(2 * np.pi * deviations**2), axis=1)
+        means, deviations = self._noise_prior
+        noise = (position[:, len(self.names) :] - means) / deviations
+        normal = -0.5 * np.sum(noise**2 + np.log(2 * np.pi * deviations**2), axis=1)
         return self.prior.log_prob(position[:, : len(self.names)]) + normal
+
+    def sample_prior(self, rng: np.random.Generator, n: int) -> Array:
+        """Draw (n, D) positions."""
+        means, deviations = self._noise_prior
+        noise = means + deviations * rng.standard_normal((n, len(NOISE_NAMES)))
+        return np.concatenate([self.prior.sample(rng, n), noise], -1)
 
     def residuals(self, position: Array, nuisance: Array) -> Array:
         """Return (P, W, 3N) residuals; rows outside the prior's support must not be asked for."""
-        return self.likelihood.residuals(self.rows(position), nuisance)
+        return self.likelihood.residuals(self.rows(position), nuisance, self.delay(position))
+
+    def delay(self, position: Array) -> Array:
+        """Return (P,) by how much poses come after wrenches [s]."""
+        return position[:, len(self.names)]
 
     def noise(self, position: Array) -> tuple[Array, Array]:
         """Return sigma (P,) and drag (P,) [N]."""
-        noise = np.exp(position[:, len(self.names) :])
+        noise = np.exp(position[:, self.simulated :])
         return noise[:, 0], noise[:, 1]
 
     def log_likelihood(self, position: Array, residuals: Array, linear: Linearisation) -> Array:
@@ -114,21 +150,21 @@ class Target:
         return self.likelihood.log_density(residuals, linear, *self.noise(position))
 
     def normal_equations(self, point: Point, derivatives: Array) -> tuple[Array, Array]:
-        """Return (P, K, K) and (P, K), see `WindowedLikelihood.normal_equations`.
+        """Return (P, S, S) and (P, S) over the S simulated columns, see `WindowedLikelihood.normal_equations`.
 
         Args:
             point: P positions.
-            derivatives: (P, W, 3N, K) of the simulated poses.
+            derivatives: (P, W, 3N, S) of the simulated poses.
         """
         noise = self.noise(point.position)
         return self.likelihood.normal_equations(point.residuals, derivatives, point.linear, *noise)
 
     def evaluate(self, position: Array, nuisance: Array) -> Point:
         """Simulate and linearise every position (P, D) at nuisances (P, W, 9): ten rollouts a row."""
-        rows = self.rows(position)
-        base = self.likelihood.simulate(rows, nuisance)
-        linear = self.likelihood.linearise(rows, nuisance, base)
-        residuals = self.likelihood.residuals(rows, nuisance, base)
+        rows, delay = self.rows(position), self.delay(position)
+        base = self.likelihood.simulate(rows, nuisance, delay)
+        linear = self.likelihood.linearise(rows, nuisance, delay, base)
+        residuals = self.likelihood.residuals(rows, nuisance, delay, base)
         value = self.log_prior(position) + self.log_likelihood(position, residuals, linear)
         return Point(position, value, residuals, linear)
 
@@ -137,26 +173,40 @@ class Target:
         noise = self.noise(point.position)
         here = point.linear.nuisance
         aim = self.likelihood.best_nuisance(point.residuals, point.linear, *noise)
-        rows = self.rows(point.position)
         best = self.likelihood.misfit(point.residuals, here, *noise)
         nuisance = here
         for share in SETTLE_SHARES:
             trial = here + share * (aim - here)
-            misfit = self.likelihood.misfit(self.likelihood.residuals(rows, trial), trial, *noise)
+            misfit = self.likelihood.misfit(self.residuals(point.position, trial), trial, *noise)
             better = misfit < best
             best = np.where(better, misfit, best)
             nuisance = np.where(better[..., None], trial, nuisance)
         return self.evaluate(point.position, nuisance)
 
-    def full_log_density(self, position: Array) -> Array:
-        """Return (P,) log densities with every row's own sensitivities: exact, ten rollouts a row."""
+    def full_log_density(self, position: Array, nuisance: Array | None = None, *, rounds: int = ROUNDS) -> Array:
+        """Return (P,) log densities, each position linearised at its own most likely nuisances.
+
+        Args:
+            position: (P, D).
+            nuisance: (P, W, 9) where the climb to those begins; None: at rest.
+            rounds: linearisations at most; 1: where the climb begins, with no climb.
+        """
         out = self.log_prior(position)
         legal = np.flatnonzero(np.isfinite(out))
-        windows = self.likelihood.windows
-        chunk = max(1, CHUNK_VALUES // (windows.seen.size * 9))
+        begin = self.likelihood.at_rest(len(legal)) if nuisance is None else nuisance[legal].copy()
+        inside = position[legal]
+        if isinstance(self.likelihood.engine, KernelEngine):
+            noise = self.noise(inside)
+            out[legal] += self.likelihood.marginal(self.rows(inside), *noise, self.delay(inside), begin, rounds=rounds)
+            return np.where(np.isfinite(out), out, -np.inf)
+        chunk = max(1, CHUNK_VALUES // (self.likelihood.windows.seen.size * 9))
         for first in range(0, len(legal), chunk):
-            part = legal[first : first + chunk]
-            out[part] = self.evaluate(position[part], self.likelihood.at_rest(len(part))).log_density
+            point = self.evaluate(inside[first : first + chunk], begin[first : first + chunk])
+            for _ in range(rounds - 1):
+                before, point = point.log_density, self.settle(point)
+                if np.all(np.abs(point.log_density - before) < SETTLED):
+                    break
+            out[legal[first : first + chunk]] = point.log_density
         return np.where(np.isfinite(out), out, -np.inf)
 
 

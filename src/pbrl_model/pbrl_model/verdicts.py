@@ -24,6 +24,11 @@ PRIOR_DRAWS = 2000
 MISSING = 3.0
 """A left-out force this many times its most likely size is a thing that the model class does not have."""
 
+UNEXPLAINED = 3.0
+"""Poses that are off by this many times their noise are not explained."""
+WORTH_SAYING = 0.02
+"""A shorter delay between the streams [s] is not worth a sentence."""
+
 
 def note_on_left_out(noise: Array, usual: float) -> tuple[str, ...]:
     """Return a sentence where the model had to leave out far more force than such models do; none otherwise.
@@ -41,6 +46,34 @@ def note_on_left_out(noise: Array, usual: float) -> tuple[str, ...]:
         f"something that this model class does not have acts with about {force:.0f} N: the numbers are less sure than "
         "their spreads say",
     )
+
+
+def note_on_noise(noise: Array) -> tuple[str, ...]:
+    """Return a sentence where the poses are off by far more than their own noise: the model does not explain them.
+
+    Args:
+        noise: (..., 2) draws of sigma and left-out force [N].
+    """
+    sigma = float(np.median(noise[..., 0]))
+    if sigma < UNEXPLAINED:
+        return ()
+    return (
+        f"no parameters that the prior allows explain the motion: it is off by {sigma:.0f} times the poses' noise; "
+        "look at the prior, the model class and the recording before using these numbers",
+    )
+
+
+def note_on_delay(delay: Array) -> tuple[str, ...]:
+    """Return a sentence where the poses are known to come late, or early; none otherwise.
+
+    Args:
+        delay: (...) draws of how late the poses come after the wrenches [s].
+    """
+    mean, sd = float(delay.mean()), float(delay.std())
+    if abs(mean) < max(3.0 * sd, WORTH_SAYING):
+        return ()
+    order = "after" if mean > 0.0 else "before"
+    return (f"the poses come {1e3 * abs(mean):.0f} ms {order} the wrenches, +- {1e3 * sd:.0f} ms: this is allowed for",)
 
 
 def notes_on(

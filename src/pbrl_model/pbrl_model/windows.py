@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,8 @@ NEARLY_REST = np.array([5e-3, 5e-3, 1e-2])
 """Smoothed velocities below this, or within three of their own standard deviations, are rest."""
 POSE_RATE = 20.0
 """So many poses a second count at most: errors of a model are not white, and more of them say nothing new."""
+RATE_STEPS = 2
+"""Steps to each side over which a wrench's change is taken."""
 LEAST_NOISE = np.array([1e-3, 1e-3, 1e-3])
 """Poses are never taken to be better than this [m, m, rad]: no body is rigid, and no gripper holds without play."""
 
@@ -40,6 +43,9 @@ class Windows:
     Attributes:
         dt: [s].
         wrench: (W, T, 3) at the centre of mass, world axes; zero after a window's end.
+        rate: (W, T, 3) its change in time [1/s], for wrenches that are a little older or younger than thought; zero
+            where their age is taken as known.
+        delay: by how much wrenches were shifted to be as late as the poses [s], see `Motion`.
         heading: (W, T) smoothed heading of the body at each step [rad].
         steps: (W,) steps of each window.
         initial: (W, 6) mean of the state of the centre of mass at the start.
@@ -55,6 +61,8 @@ class Windows:
 
     dt: float
     wrench: Array
+    rate: Array
+    delay: float
     heading: Array
     steps: Index
     initial: Array
@@ -82,9 +90,11 @@ class Windows:
 
     def take(self, rows: Index | NDArray[np.bool_]) -> Windows:
         """Return a selection of the windows."""
-        return Windows(
-            **{f.name: getattr(self, f.name) if f.name == "dt" else getattr(self, f.name)[rows] for f in fields(self)}
-        )
+        values: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        chosen: dict[str, Any] = {
+            name: value if isinstance(value, float) else value[rows] for name, value in values.items()
+        }
+        return Windows(**chosen)
 
 
 @dataclass(frozen=True)
@@ -113,6 +123,14 @@ def _initial(motion: Motion, cut: _Cut) -> tuple[Array, Array]:
     return mean, np.zeros((6, 6)) if cut.known else covariance
 
 
+def _rate(motion: Motion) -> Array:
+    """Return (T, 3) the change of the wrench in time, over a span that keeps the sensor's noise out."""
+    rows = np.arange(len(motion.wrench))
+    after = np.minimum(rows + RATE_STEPS, len(rows) - 1)
+    before = np.maximum(rows - RATE_STEPS, 0)
+    return (motion.wrench[after] - motion.wrench[before]) / (motion.dt * np.maximum(after - before, 1))[:, None]
+
+
 def _noise(motion: Motion) -> Array:
     """Return (3,) the noise of a pose; one where it is not observed, which is then not used."""
     return np.where(np.isfinite(motion.noise), np.maximum(motion.noise, LEAST_NOISE), 1.0)
@@ -125,15 +143,20 @@ def _assemble(motions: Sequence[Motion], cuts: Sequence[_Cut]) -> Windows:
     dt = motions[0].dt
     if any(motion.dt != dt for motion in motions):
         raise ModelError(f"windows: expected motions on one grid step, got {sorted({m.dt for m in motions})} s")
+    if any(motion.delay != motions[0].delay for motion in motions):
+        raise ModelError(f"windows: expected motions of one delay, got {sorted({m.delay for m in motions})} s")
     count = len(cuts)
     longest, most = max(cut.last - cut.first for cut in cuts), max(len(cut.rows) for cut in cuts)
-    wrench, heading = np.zeros((count, longest, 3)), np.zeros((count, longest))
+    wrench, rate, heading = np.zeros((count, longest, 3)), np.zeros((count, longest, 3)), np.zeros((count, longest))
+    rates = [_rate(motion) for motion in motions]
     initial, covariance = np.zeros((count, 6)), np.zeros((count, 6, 6))
     step, fraction = np.zeros((count, most), dtype=np.int64), np.zeros((count, most))
     pose, seen = np.zeros((count, most, 3)), np.zeros((count, most, 3), dtype=bool)
     for w, cut in enumerate(cuts):
         motion, n = motions[cut.episode], len(cut.rows)
         wrench[w, : cut.last - cut.first] = motion.wrench[cut.first : cut.last]
+        if not cut.known:
+            rate[w, : cut.last - cut.first] = rates[cut.episode][cut.first : cut.last]
         heading[w, : cut.last - cut.first] = motion.state[cut.first : cut.last, 2]
         initial[w], covariance[w] = _initial(motion, cut)
         place = np.clip((motion.pose_time[cut.rows] - motion.time[cut.first]) / dt, 0.0, cut.last - cut.first)
@@ -144,6 +167,8 @@ def _assemble(motions: Sequence[Motion], cuts: Sequence[_Cut]) -> Windows:
     return Windows(
         dt,
         wrench,
+        rate,
+        motions[0].delay,
         heading,
         np.array([cut.last - cut.first for cut in cuts], dtype=np.int64),
         initial,

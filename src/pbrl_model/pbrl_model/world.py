@@ -104,6 +104,11 @@ class PhysicsWorld:
         """Names of the bodies, in the order in which they were added."""
         return tuple(self._members)
 
+    @property
+    def space(self) -> pymunk.Space:
+        """The pymunk space, for what is not offered here; friction on the floor is not in it."""
+        return self._space
+
     def add_body(self, spec: BodySpec) -> None:
         """Put a body into the world, with its wheel and its hinge.
 

@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import signal
-import sys
-from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
-from multiprocessing import active_children, get_context
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +15,8 @@ from krang_sim.session import KrangSession
 from pbrl_bag import read_recording
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.processes import die_with_parent
+from pbrl_bringup.parallel import in_parallel
 from pbrl_bringup.simulate import simulate_push
-from pbrl_bringup.terminal import progress
 from pbrl_control.push_plan import PushPlan, Segment, load_plan
 from pbrl_model.fit import FitOptions, ObjectFit, fit_recording, motions_of
 from pbrl_model.predict import path_error, predict_windows, unlearned
@@ -32,11 +25,9 @@ from pbrl_model.windows import whole_windows
 Array = NDArray[np.float64]
 
 SEEDS, QUICK_SEEDS = 10, 2
-WORKERS = 2
 NEAR = 0.05  # [m] the wheel counts as found
 SHARE = 0.2  # of the unlearned model's error
 SCENE, PLAN = "locked_caster", "turn_table"
-THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -67,44 +58,8 @@ class Trial:
 def measure(seed: int, quick: bool, out: Path) -> Measured:
     """Simulate, fit and predict for consecutive seeds, in parallel processes."""
     seeds = range(seed, seed + (QUICK_SEEDS if quick else SEEDS))
-    # A spawned process reads these when it starts: one thread each, for the processes are the parallelism.
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    try:
-        trials = sorted(_in_parallel(seeds, out), key=lambda each: each.seed)
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+    trials = in_parallel(run_trial, [(number, out) for number in seeds], "seeds")
     return Measured(rows_of(trials), {"trials": [asdict(trial) for trial in trials]})
-
-
-def _in_parallel(seeds: Iterable[int], out: Path) -> list[Trial]:
-    numbers = list(seeds)
-    trials: list[Trial] = []
-    with (
-        ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn"), initializer=_obey_the_parent) as pool,
-        progress("seeds", len(numbers)) as bar,
-    ):
-        try:
-            for job in as_completed([pool.submit(run_trial, number, out) for number in numbers]):
-                trials.append(job.result())
-                bar(len(trials))
-        except BaseException:  # Ctrl-C among them: nobody waits for what is half done
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in active_children():
-                child.terminate()
-            raise
-    return trials
-
-
-def _obey_the_parent() -> None:
-    """Leave Ctrl-C, which the terminal sends to all, to the parent; let its SIGTERM unwind the stack."""
-    die_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
 
 
 def rows_of(trials: list[Trial]) -> list[Row]:

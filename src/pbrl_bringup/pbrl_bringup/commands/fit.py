@@ -28,6 +28,8 @@ def command(
     out: Path,
     model_class: str,
     likelihood: str,
+    sampler: str,
+    engine: str,
     draws: int | None,
     priors: Path | None,
     seed: int,
@@ -46,9 +48,9 @@ def command(
     asked: dict[str, Any] = {} if draws is None else {"draws": draws}
     if priors is not None:
         asked["priors"] = load_prior_options(priors)
-    options = FitOptions(model_class=chosen, likelihood=likelihood, seed=seed, **asked)
+    options = FitOptions(model_class=chosen, likelihood=likelihood, sampler=sampler, engine=engine, seed=seed, **asked)
     with result_folder(out) as folder:
-        with Console(stderr=True).status(f"learning ({chosen}, {likelihood}, seed {seed})"):
+        with Console(stderr=True).status(f"learning ({chosen}, {likelihood}, {sampler}, {engine}, seed {seed})"):
             fit = fit_recording(recording, options)
         report = fit_report(recording, fit, seed, "./pbrl " + shlex.join(sys.argv[1:]))
         for name, found in fit.objects.items():

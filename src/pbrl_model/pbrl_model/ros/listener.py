@@ -1,4 +1,4 @@
-"""Hears the topics of a recording, from whoever publishes them, and keeps the bytes until they are asked for."""
+"""Hears the topics of a recording, from whoever publishes them, and keeps the bytes that may still be asked for."""
 
 from __future__ import annotations
 
@@ -19,25 +19,30 @@ from pbrl_bag.builder import RecordingBuilder
 from pbrl_bag.errors import BagError
 from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
 from pbrl_bag.types import Recording
+from pbrl_model.ros.heard import Heard, Message
 
 DISCOVERY_SECONDS = 0.1
+MEMORY = 200.0
+"""Kept at most [MB]: an hour of a robot that holds things with two wrists."""
 
 
 class RecordingListener(Node):
     """Subscribes to every topic that plays a role in a recording, as soon as somebody publishes it.
 
     A node of its own with an executor of its own in a thread, so that a fit in the other node's callback does not
-    make it deaf. Messages are kept as bytes: some 60 kB for a second of a robot with two wrists.
+    make it deaf. Messages are kept as bytes: some 60 kB for a second of a robot with two wrists. What lies between two
+    holds is forgotten, and the oldest of all beyond `memory`; see `Heard`.
 
     Args:
         name: of the node.
         context: the one to join; None: the default one.
+        memory: kept at most [MB].
     """
 
-    def __init__(self, name: str, context: Context | None = None):
+    def __init__(self, name: str, context: Context | None = None, memory: float = MEMORY):
         super().__init__(name, context=context, start_parameter_services=False, enable_rosout=False)
         self._builder = RecordingBuilder()
-        self._heard: list[tuple[str, type, bytes]] = []
+        self._heard = Heard(round(memory * 1e6))
         self._last: dict[str, tuple[type, bytes]] = {}
         self._subscriptions_by_topic: dict[str, tuple[Subscription, QoSProfile]] = {}
         self._refused: set[str] = set()
@@ -58,24 +63,31 @@ class RecordingListener(Node):
         self.destroy_node()
 
     def count(self) -> int:
-        """Return how many messages have been heard."""
-        return len(self._heard)
+        """Return how many messages have been heard, forgotten ones too."""
+        return self._heard.count
 
     def last(self, topic: str) -> Any | None:
         """Return the last message of a topic, or None."""
         entry = self._last.get(topic)
         return None if entry is None else deserialize_message(entry[1], entry[0])
 
+    def follow(self) -> None:
+        """Keep what comes from now on for `fresh`, too."""
+        self._heard.follow()
+
+    def fresh(self) -> list[Message]:
+        """Return what has been heard since the last call; see `follow`."""
+        return self._heard.fresh()
+
     def recording(self) -> Recording:
-        """Return what has been heard so far.
+        """Return what has been heard so far and not been forgotten.
 
         Raises:
             BagError: a topic is missing or a stream is malformed.
         """
-        heard = self._heard[:]  # one bytecode: the listener's thread may append, and does not have to wait
         builder = RecordingBuilder()
-        for topic, kind, data in heard:
-            builder.add(topic, deserialize_message(data, kind))
+        for message in self._heard.kept():
+            builder.add(message.topic, message.decoded())
         return builder.build("what was heard")
 
     def discover(self) -> None:
@@ -105,8 +117,9 @@ class RecordingListener(Node):
         self._subscriptions_by_topic[topic] = (subscription, profile)
 
     def _keep(self, topic: str, kind: type, data: bytes) -> None:
-        self._heard.append((topic, kind, data))
         self._last[topic] = (kind, data)
+        for note in self._heard.add(Message(topic, kind, data)):
+            self.get_logger().warning(note)
 
     def _spin(self) -> None:
         with contextlib.suppress(ExternalShutdownException):

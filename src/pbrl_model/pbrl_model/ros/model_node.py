@@ -1,8 +1,12 @@
-"""Learns object models when asked, from what it has heard or from a recording, and publishes them with samples."""
+"""Learns object models as data come in, and when asked, and publishes them with samples; keeps them on disk."""
 
 from __future__ import annotations
 
 import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +27,17 @@ from pbrl_bag import read_recording
 from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.stopping import ended_by_signals, init_until_signal, spin_until
-from pbrl_bag.types import Recording
+from pbrl_bag.types import BodyGeometry, Recording
 from pbrl_model.errors import ModelError
-from pbrl_model.fit import FitOptions, fit_recording
+from pbrl_model.fit import Fit, FitOptions, ObjectFit, fit_recording
+from pbrl_model.online import OnlineLearner, OnlineOptions, adopted
+from pbrl_model.online_state import Stored, load_all, prepare, save
 from pbrl_model.posterior import Posterior
 from pbrl_model.prior_options import PriorOptions, load_prior_options
 from pbrl_model.ros.conversions import models_to_msg
-from pbrl_model.ros.listener import RecordingListener
+from pbrl_model.ros.listener import MEMORY, RecordingListener
 from pbrl_model.ros.markers import model_markers
+from pbrl_model.ros.online_worker import OnlineWorker
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 MARKER_SECONDS = 0.5
@@ -39,9 +46,12 @@ MARKER_SECONDS = 0.5
 class ModelNode(Node):
     """Offers `/learn`; publishes `/object_models` and `/object_models/markers`.
 
+    With `online`, posteriors go on from window to window while something is held, and what is known is published at
+    least every `period` as long as data come. With `state`, what is known is kept in files and served after a restart.
+
     Raises:
         BagError: a wrong parameter.
-        ModelError: the file of priors is not usable.
+        ModelError: the file of priors or a file of the state is not usable.
     """
 
     def __init__(self, context: Context | None = None, **options: Any):
@@ -49,22 +59,94 @@ class ModelNode(Node):
         draws = "draws published for each object"
         self._max_draws: int = declare(self, "max_draws", 1000, draws, (1, 100_000))
         priors = declare(self, "priors", "", "YAML file of priors, as config/params/priors.yaml; empty: its defaults")
+        online = declare(self, "online", True, "whether to learn while something is held, without being asked")
+        model_class = declare(self, "model_class", "wheel+ground", "what is learned online; as /learn's model_class")
+        particles = declare(self, "particles", 300, "of each object that is learned online", (50, 100_000))
+        period = declare(self, "period", 0.5, "time between two publications while data come [s]", (0.05, 1.0))
+        state = declare(self, "state", "", "folder that keeps what was learned, one file an object; empty: nothing")
+        memory = declare(self, "memory", MEMORY, "messages kept for /learn at most [MB]", (1.0, 100_000.0))
         refuse_unknown(self)
         self._priors = load_prior_options(Path(priors)) if priors else PriorOptions()
+        fit = FitOptions(model_class=model_class, priors=self._priors)
+        self._options = OnlineOptions(fit=fit, particles=particles)
+        self._folder = Path(state) if state else None
+        stored = self._stored()
         self._posteriors: dict[str, Posterior] = {}
+        self._lock = threading.Lock()
+        self._stamp = 0.0
+        self._published = 0
         self._models = self.create_publisher(ObjectModels, "/object_models", LATCHED)
         self._markers = self.create_publisher(MarkerArray, "/object_models/markers", QoSProfile(depth=1))
-        self.listener = RecordingListener("model_node_listener", context)
-        self.listener.start()
+        self.listener = RecordingListener("model_node_listener", context, memory)
         self.create_service(LearnModel, "/learn", self._learn)
         self.create_timer(MARKER_SECONDS, self._draw, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._serve(stored)
+        self._worker = self._start_learning(stored, period) if online else None
+        self.listener.start()
+
+    def _stored(self) -> dict[str, Stored]:
+        """Return what is on disk."""
+        if self._folder is None:
+            return {}
+        prepare(self._folder)
+        return load_all(self._folder)
+
+    def _serve(self, stored: Mapping[str, Stored]) -> None:
+        """Publish what is on disk."""
+        if not stored:
+            return
+        last = max((motion.time[-1] for one in stored.values() for motion in one.learned.motions), default=0.0)
+        self._changed({name: one.posterior for name, one in stored.items()}, float(last))
+        self.get_logger().info(f"known already: {', '.join(stored)}")
+        given = self._options.fit
+        for name, one in stored.items():
+            if one.fit.model_class != given.model_class or one.fit.priors != given.priors:
+                self.get_logger().warning(
+                    f"{name}: goes on with the model class ({one.fit.model_class}) and the priors that it was learned "
+                    "with, not with those given now; to begin anew, move its file away (state)"
+                )
+
+    def _start_learning(self, stored: Mapping[str, Stored], period: float) -> OnlineWorker:
+        learner = OnlineLearner(self._options)
+        for one in stored.values():
+            learner.resume(one.learned, one.posterior, one.fit)
+        warn = self.get_logger().warning
+        worker = OnlineWorker(learner, self.listener, self._folder, self._changed, warn, period)
+        # In the listener's thread: this node's own is busy while it answers /learn.
+        self.listener.create_timer(period, self._publish_if_heard, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        worker.start()
+        return worker
+
+    def _changed(self, posteriors: Mapping[str, Posterior], last_used: float) -> None:
+        """Publish what has been learned anew, with the rest; last_used is the end of the data [s]."""
+        with self._lock:
+            thinned = {
+                name: one.thinned(self._max_draws, np.random.default_rng(self._options.fit.seed))
+                for name, one in posteriors.items()
+            }
+            self._posteriors = self._posteriors | thinned
+            self._stamp = last_used
+        self._publish()
+
+    def _publish(self) -> None:
+        with self._lock:
+            self._models.publish(models_to_msg(self._posteriors.values(), _stamp(self._stamp)))
+
+    def _publish_if_heard(self) -> None:
+        """Publish what is known, if anything was heard since the last time."""
+        heard = self.listener.count()
+        if heard != self._published and self._posteriors:
+            self._published = heard
+            self._publish()
 
     def _learn(self, request: LearnModel.Request, response: LearnModel.Response) -> LearnModel.Response:
         """Fit, publish and answer; what goes wrong is the answer's message."""
         try:
-            with ended_by_signals():  # a fit takes longer than one waits for a node to end
+            with ended_by_signals(), self._learning_paused():  # a fit takes longer than one waits for a node to end
                 recording = read_recording(Path(request.recording)) if request.recording else self.listener.recording()
-                learned = self._fit(recording, request)
+                options = self._fit_options(request)
+                found = fit_recording(recording, options)
+                response.models = self._take(found, recording, options, heard=not request.recording)
         except (BagError, ModelError) as error:
             response.message = " ".join(str(error).split())
             self.get_logger().warning(f"/learn: {response.message}")
@@ -73,24 +155,47 @@ class ModelNode(Node):
             response.message = f"internal error: {type(error).__name__}: {' '.join(str(error).split())}"
             self.get_logger().error(f"/learn: {response.message}")
             return response
-        rng = np.random.default_rng(request.seed)
-        self._posteriors |= {posterior.object: posterior.thinned(self._max_draws, rng) for posterior in learned}
-        stamp = _stamp(_end_of(recording))
-        response.models = models_to_msg([self._posteriors[posterior.object] for posterior in learned], stamp)
-        self._models.publish(models_to_msg(self._posteriors.values(), stamp))
         response.success = True
-        response.message = f"learned {', '.join(posterior.object for posterior in learned)}"
+        response.message = f"learned {', '.join(found.objects)}"
         self.get_logger().info(response.message)
         return response
 
-    def _fit(self, recording: Recording, request: LearnModel.Request) -> list[Posterior]:
-        options = FitOptions(
+    @contextmanager
+    def _learning_paused(self) -> Iterator[None]:
+        if self._worker is None:
+            yield
+        else:
+            with self._worker.paused():
+                yield
+
+    def _fit_options(self, request: LearnModel.Request) -> FitOptions:
+        return FitOptions(
             model_class=request.model_class or FitOptions.model_fields["model_class"].default,
             objects=tuple(request.objects),
             seed=request.seed,
             priors=self._priors,
         )
-        return [found.posterior for found in fit_recording(recording, options).objects.values()]
+
+    def _take(self, found: Fit, recording: Recording, options: FitOptions, *, heard: bool) -> ObjectModels:
+        """Publish what was fitted, keep it, and go on from it; return it as a message."""
+        rng = np.random.default_rng(options.seed)
+        posteriors = {name: one.posterior.thinned(self._max_draws, rng) for name, one in found.objects.items()}
+        end = _end_of(recording)
+        self._changed(posteriors, end)
+        for name, one in found.objects.items():
+            if name in recording.bodies and (self._worker is not None or self._folder is not None):
+                self._keep(one, recording.bodies[name], posteriors[name], options, heard=heard)
+        return models_to_msg(posteriors.values(), _stamp(end))
+
+    def _keep(
+        self, found: ObjectFit, geometry: BodyGeometry, posterior: Posterior, options: FitOptions, *, heard: bool
+    ) -> None:
+        """Write what was fitted to disk, and go on from it online."""
+        stored = Stored(adopted(found, geometry, replace(self._options, fit=options)), posterior, options)
+        if self._folder is not None:
+            save(self._folder, stored)
+        if self._worker is not None:
+            self._worker.give(stored, heard=heard)
 
     def _draw(self) -> None:
         """Publish markers where the objects were last seen."""
@@ -104,6 +209,8 @@ class ModelNode(Node):
 
     def destroy_node(self) -> None:
         """Stop listening with the node."""
+        if self._worker is not None:
+            self._worker.stop()
         self.listener.stop()
         super().destroy_node()
 

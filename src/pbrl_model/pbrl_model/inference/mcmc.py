@@ -4,6 +4,10 @@
 one kernel call serves them all. Each chain has its own proposal, a Gaussian with the covariance of what it has seen,
 scaled towards the acceptance that is best for a Gaussian target (Roberts and Rosenthal 2009). Adaptation is a flag of
 the state: after `freeze` the chain is plain Metropolis and keeps detailed balance.
+
+Where the density is dear, a cheap one near it can go before it: only proposals that the cheap one takes are judged by
+the exact one, for what the two differ in (delayed acceptance, Christen and Fox 2005). The chain is then one of the
+exact density.
 """
 
 from __future__ import annotations
@@ -19,6 +23,9 @@ from pbrl_model.errors import ModelError
 Array = NDArray[np.float64]
 LogDensity = Callable[[Array, Array | None], tuple[Array, Array]]
 """(positions (C, D), memo or None) -> (log densities (C,), memo (C, ...)). See `FrozenTarget.density`."""
+
+ExactDensity = Callable[[Array, NDArray[np.int64]], Array]
+"""(positions (R, D), their chains (R,)) -> log densities (R,)."""
 
 WANTED = {1: 0.44, 2: 0.35}
 WANTED_MANY = 0.25
@@ -53,6 +60,7 @@ class State:
         log_scale: (C, B) of each block's proposal.
         count: steps done while adapting.
         adapting: whether steps still adapt.
+        exact: (C,) exact log densities where `log_density` is a cheap one's, else None.
     """
 
     position: Array
@@ -63,6 +71,7 @@ class State:
     log_scale: Array
     count: int
     adapting: bool
+    exact: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -72,7 +81,13 @@ class Info:
     accepted: NDArray[np.bool_]
 
 
-def init(density: LogDensity, position: Array, covariance: Array, blocks: Sequence[Block]) -> State:
+def init(
+    density: LogDensity,
+    position: Array,
+    covariance: Array,
+    blocks: Sequence[Block],
+    exact: ExactDensity | None = None,
+) -> State:
     """Return the first state.
 
     Args:
@@ -80,17 +95,19 @@ def init(density: LogDensity, position: Array, covariance: Array, blocks: Sequen
         position: (C, D).
         covariance: (C, D, D) first guess of the target's covariance around each.
         blocks: that together cover the columns.
+        exact: where `density` only goes before it.
 
     Raises:
         ModelError: a chain starts where the density is zero.
     """
     log_density, memo = density(position, None)
-    if not np.all(np.isfinite(log_density)):
+    value = None if exact is None else exact(position, np.arange(len(position)))
+    if not np.all(np.isfinite(log_density if value is None else value)):
         raise ModelError(
             f"chains: expected starts of positive density, got {np.sum(~np.isfinite(log_density))} without"
         )
     scale = np.log([[2.38 / np.sqrt(len(block.columns)) for block in blocks]] * len(position))
-    return State(position.copy(), log_density, memo, position.copy(), covariance.copy(), scale, 0, True)
+    return State(position.copy(), log_density, memo, position.copy(), covariance.copy(), scale, 0, True, value)
 
 
 def freeze(state: State) -> State:
@@ -98,7 +115,13 @@ def freeze(state: State) -> State:
     return replace(state, adapting=False)
 
 
-def step(rng: np.random.Generator, state: State, density: LogDensity, blocks: Sequence[Block]) -> tuple[State, Info]:
+def step(
+    rng: np.random.Generator,
+    state: State,
+    density: LogDensity,
+    blocks: Sequence[Block],
+    exact: ExactDensity | None = None,
+) -> tuple[State, Info]:
     """Move every block of every chain once.
 
     Args:
@@ -106,11 +129,12 @@ def step(rng: np.random.Generator, state: State, density: LogDensity, blocks: Se
         state: of all chains.
         density: log density.
         blocks: as given to `init`.
+        exact: as given to `init`.
     """
     accepted = np.zeros((len(state.position), len(blocks)), dtype=bool)
     log_scale = state.log_scale.copy()
     for b, block in enumerate(blocks):
-        state, taken, probability = _move(rng, state, density, block, np.exp(state.log_scale[:, b]))
+        state, taken, probability = _move(rng, state, density, block, np.exp(state.log_scale[:, b]), exact)
         accepted[:, b] = taken
         if state.adapting:
             wanted = WANTED.get(len(block.columns), WANTED_MANY)
@@ -121,7 +145,12 @@ def step(rng: np.random.Generator, state: State, density: LogDensity, blocks: Se
 
 
 def _move(
-    rng: np.random.Generator, state: State, density: LogDensity, block: Block, scale: Array
+    rng: np.random.Generator,
+    state: State,
+    density: LogDensity,
+    block: Block,
+    scale: Array,
+    exact: ExactDensity | None,
 ) -> tuple[State, NDArray[np.bool_], Array]:
     """Propose and accept or reject one block in every chain; return (state, taken, acceptance probability)."""
     columns = list(block.columns)
@@ -135,14 +164,24 @@ def _move(
     log_density, memo = density(proposal, state.memo if block.keeps_memo else None)
     gain = log_density - state.log_density
     taken = luck < gain
+    probability = np.exp(np.minimum(gain, 0.0))
+    value = known = state.exact
+    if exact is not None and known is not None:
+        chosen, again = np.flatnonzero(taken), np.log(rng.random(chains))
+        value = np.full(chains, -np.inf)
+        if len(chosen):
+            value[chosen] = exact(proposal[chosen], chosen)
+        taken = taken & (again < value - known - np.where(taken, gain, 0.0))
+        value, probability = np.where(taken, value, known), taken.astype(float)
     shaped = taken.reshape(-1, *([1] * (memo.ndim - 1)))
     moved = replace(
         state,
         position=np.where(taken[:, None], proposal, state.position),
         log_density=np.where(taken, log_density, state.log_density),
         memo=state.memo if block.keeps_memo else np.where(shaped, memo, state.memo),
+        exact=value,
     )
-    return moved, taken, np.exp(np.minimum(gain, 0.0))
+    return moved, taken, probability
 
 
 def _learn(state: State) -> State:
@@ -178,16 +217,17 @@ def run(
     burn_in: int,
     draws: int,
     thin: int = 1,
+    exact: ExactDensity | None = None,
 ) -> Chains:
     """Adapt for `burn_in` steps, freeze, and keep every `thin`-th of the rest."""
     for _ in range(burn_in):
-        state, _ = step(rng, state, density, blocks)
+        state, _ = step(rng, state, density, blocks, exact)
     state = freeze(state)
     positions, densities, taken = [], [], []
     for k in range(draws * thin):
-        state, info = step(rng, state, density, blocks)
+        state, info = step(rng, state, density, blocks, exact)
         taken.append(info.accepted)
         if (k + 1) % thin == 0:
             positions.append(state.position)
-            densities.append(state.log_density)
+            densities.append(state.log_density if state.exact is None else state.exact)
     return Chains(np.stack(positions, 1), np.stack(densities, 1), np.mean(taken, axis=0))

@@ -1,0 +1,26 @@
+"""`./pbrl experiment NAME`: repeat an experiment of the thesis, with its number beside ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pbrl_bringup.commands.measured import run_measured
+
+EXPERIMENTS = {
+    "shopping-cart": "figure 23a: agents push a cart round a wall to a goal, without noise",
+    "shopping-cart-noisy": "figure 23b: the same with noise on what is observed",
+    "apartment": "figure 23c: eleven objects learned and moved to their places",
+    "sample-efficiency": "figure 24: observations needed for ten household objects",
+    "noise": "figure 26: accuracy against training size and against noise",
+    "robot-fits": "figure 30: tables and a cart pushed by Krang, fitted three ways",
+    "contact": "section 6.5.3: a wheel found on a table that is only pushed by another",
+}
+
+
+def command(name: str, out: Path | None, seed: int, quick: bool) -> int:
+    """Run one experiment.
+
+    Raises:
+        BringupError: there is none of that name.
+    """
+    return run_measured("experiment", EXPERIMENTS, name, out, seed, quick)

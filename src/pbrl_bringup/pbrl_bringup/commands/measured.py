@@ -1,0 +1,57 @@
+"""What benches and experiments share: find by name, measure, print a table and, as the last line, the report."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+
+from pbrl_bringup.benches.rows import last_line, report
+from pbrl_bringup.errors import BringupError
+from pbrl_bringup.files import output_folder
+from pbrl_bringup.terminal import output, say, table
+
+
+def run_measured(kind: str, known: Mapping[str, str], name: str, out: Path | None, seed: int, quick: bool) -> int:
+    """Run the module `pbrl_bringup.<kind>s.<name>`.
+
+    Args:
+        kind: "bench" or "experiment".
+        known: what there is of that kind, and a sentence on each.
+        name: which to run.
+        out: folder of the report; None: out/<kind>/<name>.
+        seed: of every random draw.
+        quick: whether to do a smaller version.
+
+    Raises:
+        BringupError: there is none of that name.
+    """
+    if name not in known:
+        near = difflib.get_close_matches(name, known, 1)
+        advice = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+        raise BringupError(f"{kind} {name!r} is not known; {advice}")
+    folder = out or Path("out") / kind / name
+    output_folder(folder)
+    say(f"pbrl: {kind} {name}: {known[name]}; seed {seed}, results in {folder}")
+    module = import_module(f"pbrl_bringup.{PACKAGES[kind]}.{name.replace('-', '_')}")
+    summary = report(name, seed, module.measure, quick, folder)
+    rows = [
+        (row["what"], _value(row["value"]), row["unit"], row["goal"], _mark(row["holds"])) for row in summary["rows"]
+    ]
+    output().print(table(f"{kind} {name}", ("what", "value", "unit", "goal", "holds"), rows, right=(1,)))
+    print(last_line(summary))
+    return 0
+
+
+PACKAGES = {"bench": "benches", "experiment": "experiments"}
+
+
+def _value(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.0f}" if value == int(value) else f"{value:.4g}"
+
+
+def _mark(holds: bool) -> str:
+    return "[green]yes[/]" if holds else "[red]no[/]"

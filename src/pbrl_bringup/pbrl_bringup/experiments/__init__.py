@@ -1,0 +1,1 @@
+"""Experiments of the thesis, repeated; each module has `measure(seed, quick, out)` and writes `figure.png`."""

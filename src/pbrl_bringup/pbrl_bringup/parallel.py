@@ -1,0 +1,71 @@
+"""Independent trials in processes of their own, each on one core; the same results whatever the number of cores."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from multiprocessing import active_children, get_context
+from typing import Any, TypeVar
+
+from pbrl_bringup.processes import die_with_parent
+from pbrl_bringup.terminal import progress
+
+Result = TypeVar("Result")
+
+THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+
+
+def in_parallel(trial: Callable[..., Result], arguments: Sequence[tuple[Any, ...]], what: str) -> list[Result]:
+    """Run a trial for each tuple of arguments and return the results in their order.
+
+    Args:
+        trial: a function of a module, so that another process can find it.
+        arguments: of each trial.
+        what: plural of a trial, for the progress bar.
+
+    Raises:
+        Exception: whatever the first failing trial raised; the others are given up.
+    """
+    results: dict[int, Result] = {}
+    with (
+        _one_thread_each(),
+        ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn"), initializer=_obey_the_parent) as pool,
+        progress(what, len(arguments)) as bar,
+    ):
+        try:
+            jobs = {pool.submit(trial, *each): index for index, each in enumerate(arguments)}
+            for job in as_completed(jobs):
+                results[jobs[job]] = job.result()
+                bar(len(results))
+        except BaseException:  # Ctrl-C among them: nobody waits for what is half done
+            pool.shutdown(wait=False, cancel_futures=True)
+            for child in active_children():
+                child.terminate()
+            raise
+    return [results[index] for index in range(len(arguments))]
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Have processes that are spawned inside the block use one thread each: they are the parallelism."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _obey_the_parent() -> None:
+    """Leave Ctrl-C, which the terminal sends to all, to the parent; let its SIGTERM unwind the stack."""
+    die_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))

@@ -1,0 +1,1 @@
+"""Inference on any log density: modes, Metropolis, importance sampling with evidence, sequential Monte Carlo."""
