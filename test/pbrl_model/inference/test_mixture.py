@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import multivariate_t
 
 from pbrl_model.errors import ModelError
-from pbrl_model.inference.mixture import Mixture, inside_draws, positive, stratified
+from pbrl_model.inference.mixture import Mixture, inside_draws, inverse, positive, stratified
 from pbrl_model.inference.problem import Domain
 
 Array = NDArray[np.float64]
@@ -109,6 +109,17 @@ def test_positive_leaves_what_is_positive_and_mends_what_is_not() -> None:
     assert positive(sound) == pytest.approx(sound)
     mended = positive(np.array([[1.0, 1.0], [1.0, 1.0]]))
     assert np.linalg.eigvalsh(mended).min() > 0.0
+
+
+def test_inverse_is_the_inverse_and_stays_positive_however_columns_are_scaled() -> None:
+    rng = np.random.default_rng(3)
+    factor = rng.normal(size=(200, 7, 4))  # of rank four: rounding alone decides the sign of the rest
+    steep = factor @ np.swapaxes(factor, -1, -2) * 10.0 ** rng.uniform(-7, 7, (200, 1, 1)) + 1e-3 * np.eye(7)
+    np.linalg.cholesky(inverse(steep))
+    plain = np.array([[4.0, 1.0], [1.0, 3.0]])
+    np.testing.assert_allclose(inverse(plain) @ plain, np.eye(2), atol=1e-12)
+    scale = np.array([1e-6, 1e5])
+    np.testing.assert_allclose(inverse(plain * np.outer(scale, scale)) * np.outer(scale, scale), inverse(plain))
 
 
 @pytest.mark.parametrize(

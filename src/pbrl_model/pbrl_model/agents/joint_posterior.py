@@ -23,6 +23,7 @@ from pbrl_model.agents.planning import Planner, Space
 from pbrl_model.agents.room import ITERATIONS, Push, contact_world
 from pbrl_model.contact_world import rollout_contact
 from pbrl_model.distributions import LogNormal, TruncatedNormal
+from pbrl_model.inference.mixture import stratified
 from pbrl_model.transition_classes import transition_class
 from pbrl_model.transition_model import LearnOptions, TransitionPosterior, learn_body
 from pbrl_model.transitions import concatenate, state_scale
@@ -33,6 +34,7 @@ NEAR = 0.015  # [m] bodies nearer than this on the way may have touched
 CONTACT_SIGMA = 0.01  # [m] what contact is trusted to: it magnifies small differences of pose
 ATTEMPTS = 3  # at an inference that says it did not converge
 LEAST_SHARE = 0.05  # effective share of joint draws below which a contact's weights are not believed
+POOL = 12_800  # joint draws at most that a contact chooses from: one body's prior alone is wide
 RESTITUTION = LogNormal(0.1, 1.0)  # table 2
 CONTACT_FRICTION = TruncatedNormal(0.3, 0.3, 0.0, 1.0)  # table 2
 
@@ -114,19 +116,23 @@ class JointLearner:
         """
         bodies = len(self._scene.things)
         rows = np.stack([self._drawn(index, draws) for index in range(bodies)], axis=1)
-        coefficients = np.stack(
-            [RESTITUTION.sample(self._rng, draws * bodies), CONTACT_FRICTION.sample(self._rng, draws * bodies)], axis=1
-        ).reshape(draws, bodies, 2)
-        notes = self._notes()
+        coefficients = np.stack([self._coefficients(draws) for _ in range(bodies)], axis=1)
+        notes, weighed = self._notes(), np.zeros(bodies, dtype=bool)
         for push in self._touching:
+            new = _took_part(push) & ~weighed
             weight = self._contact_weight(rows, coefficients, push)
-            effective = 1.0 / (weight**2).sum()
-            if effective < LEAST_SHARE * draws:
+            if _effective(weight) < LEAST_SHARE * draws and new.any():
+                rows, coefficients = self._drawn_anew(rows, coefficients, np.flatnonzero(new).tolist())
+                weight = self._contact_weight(rows, coefficients, push)
+            if _effective(weight) >= LEAST_SHARE * draws:
+                weighed |= new
+            else:
                 name = self._scene.names[push.target]
-                notes.append(f"{name}: a push with contact fits {effective:.1f} of {draws} joint draws; left out")
-                continue
-            pick = np.searchsorted(np.cumsum(weight), (self._rng.random() + np.arange(draws)) / draws)
-            pick = np.minimum(pick, draws - 1)
+                notes.append(
+                    f"{name}: a push with contact fits {_effective(weight):.1f} of {len(rows)} joint draws; left out"
+                )
+                weight = np.full(len(rows), 1.0 / len(rows))
+            pick = stratified(self._rng, weight, draws)
             rows, coefficients = rows[pick], coefficients[pick]
         classes = tuple(
             self.posteriors[index].class_probabilities
@@ -145,6 +151,18 @@ class JointLearner:
             else:
                 notes.append(f"{name}: never pushed without touching something; its prior stands")
         return notes
+
+    def _drawn_anew(self, rows: Array, coefficients: Array, bodies: Sequence[int]) -> tuple[Array, Array]:
+        """Return more joint draws, with bodies that no contact has tied to anything yet drawn anew."""
+        pool = max(len(rows), POOL)
+        rows, coefficients = (np.resize(each, (pool, *each.shape[1:])) for each in (rows, coefficients))
+        for index in bodies:
+            rows[:, index], coefficients[:, index] = self._drawn(index, pool), self._coefficients(pool)
+        return rows, coefficients
+
+    def _coefficients(self, draws: int) -> Array:
+        """Return (draws, 2) restitution and contact friction of one body, from the prior."""
+        return np.stack([RESTITUTION.sample(self._rng, draws), CONTACT_FRICTION.sample(self._rng, draws)], axis=1)
 
     def _drawn(self, index: int, draws: int) -> Array:
         """Return (draws, 12) rows of one body, in an order of their own, so that bodies are independent."""
@@ -174,6 +192,18 @@ class JointLearner:
     def _geometry(self, index: int) -> BodyGeometry:
         thing = self._scene.things[index]
         return BodyGeometry(thing.name, thing.footprint, float("nan"), float("nan"), True, thing.start)
+
+
+def _effective(weight: Array) -> float:
+    """Return how many draws normalised weights (N,) are worth."""
+    return 1.0 / float((weight**2).sum())
+
+
+def _took_part(push: Push) -> NDArray[np.bool_]:
+    """Tell which bodies (K,) a push moved; the pushed one is always among them."""
+    moved = np.hypot(*(push.after[:, :2] - push.before[:, :2]).T) > NEAR
+    moved[push.target] = True
+    return np.asarray(moved)
 
 
 def simulate_push(scene: Scene, rows: Array, coefficients: Array, push: Push) -> Array:

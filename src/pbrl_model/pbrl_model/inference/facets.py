@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pbrl_model.errors import ModelError
 from pbrl_model.inference.metered import Metered
-from pbrl_model.inference.mixture import Mixture, inside_draws, positive
+from pbrl_model.inference.mixture import Mixture, inside_draws, inverse, positive
 from pbrl_model.inference.optimise import begin, slopes
 
 Array = NDArray[np.float64]
@@ -66,10 +66,10 @@ def probed(rng: np.random.Generator, meter: Metered, theta: Array, covariance: A
     """
     probes = [theta]
     for width in WIDTHS:
-        wide = np.linalg.inv(np.linalg.inv(covariance) / width + np.diag(meter.spread**-2.0))
+        wide = inverse(inverse(covariance) / width + np.diag(meter.spread**-2.0))
         around = Mixture.around(theta, wide, np.ones(len(theta)), meter.domain)
         probes.append(inside_draws(rng, around, max(1, options.probes // len(WIDTHS))))
-    scale = np.linalg.inv(covariance).mean(axis=0)
+    scale = inverse(covariance).mean(axis=0)
     return facets(meter, np.concatenate(probes), scale, options)
 
 
@@ -119,8 +119,7 @@ def _local_gaussians(meter: Metered, places: Array, scale: Array) -> _Gaussians:
     here = here.take(np.flatnonzero(np.isfinite(here.value)))
     same = np.repeat(positive(scale)[None], len(here.theta), axis=0)
     curvature, slope = slopes(meter, replace(here, curvature=same), 1.0, step_sd=STEP_SD)
-    precision = positive(curvature)
-    covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
+    precision, covariance = positive(curvature), inverse(curvature)
     shift = np.einsum("sij,sj->si", covariance, slope)
     rise = np.maximum(np.einsum("si,si->s", shift, slope), 1e-300)
     limit = FARTHEST * np.sqrt(meter.domain.dimension)

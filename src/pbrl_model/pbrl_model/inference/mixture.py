@@ -23,6 +23,8 @@ DOF = 5.0
 """Degrees of freedom: heavier tails than a posterior's, so that weights stay bounded."""
 TRIES = 20
 """Batches of draws at most, to have as many within the domain as wanted."""
+FLATTEST = 1e-10
+"""Columns scaled to unit diagonal, no eigenvalue of a matrix counts as smaller: it would be rounding."""
 LEAST_WEIGHT = 0.2
 """No component falls below this share of an equal weight: a mode that few draws hit now may still be one."""
 
@@ -140,13 +142,29 @@ def stratified(rng: np.random.Generator, weight: Array, n: int) -> NDArray[np.in
     return np.minimum(np.searchsorted(edges, ticks * edges[-1], side="right"), len(weight) - 1).astype(np.int64)
 
 
-def positive(matrices: Array, floor: float = 1e-10) -> Array:
+def positive(matrices: Array, floor: float = FLATTEST) -> Array:
     """Return symmetric matrices (..., D, D) with eigenvalues, columns scaled to unit diagonal, not below a floor."""
+    values, vectors, scale = _axes(matrices)
+    return _assembled(np.maximum(values, floor), vectors) * scale[..., :, None] * scale[..., None, :]
+
+
+def inverse(matrices: Array, floor: float = FLATTEST) -> Array:
+    """Return the inverses of what `positive` returns: positive as well, whatever rounding did to the matrices."""
+    values, vectors, scale = _axes(matrices)
+    return _assembled(1.0 / np.maximum(values, floor), vectors) / scale[..., :, None] / scale[..., None, :]
+
+
+def _axes(matrices: Array) -> tuple[Array, Array, Array]:
+    """Return eigenvalues and eigenvectors of matrices scaled to unit diagonal, and the columns' scales."""
     scale = np.sqrt(np.maximum(np.einsum("...ii->...i", matrices), 1e-300))
-    outer = scale[..., :, None] * scale[..., None, :]
-    scaled = matrices / outer
+    scaled = matrices / scale[..., :, None] / scale[..., None, :]
     values, vectors = np.linalg.eigh(0.5 * (scaled + np.swapaxes(scaled, -1, -2)))
-    return np.einsum("...ik,...k,...jk->...ij", vectors, np.maximum(values, floor), vectors) * outer
+    return values, vectors, scale
+
+
+def _assembled(values: Array, vectors: Array) -> Array:
+    whole = np.einsum("...ik,...k,...jk->...ij", vectors, values, vectors)
+    return 0.5 * (whole + np.swapaxes(whole, -1, -2))
 
 
 def inside_draws(rng: np.random.Generator, mixture: Mixture, n: int) -> Array:

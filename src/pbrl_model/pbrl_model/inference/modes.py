@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pbrl_model.errors import ModelError
 from pbrl_model.inference.metered import Metered
-from pbrl_model.inference.mixture import positive
+from pbrl_model.inference.mixture import inverse
 from pbrl_model.inference.optimise import Optima, begin, climb, slopes
 from pbrl_model.inference.problem import Domain
 
@@ -173,7 +173,7 @@ def _merged(meter: Metered, ends: Optima, hits: NDArray[np.int64], most: int, st
     order = order[ends.value[order] > ends.value[order[0]] - 3.0 * NEGLIGIBLE][: 4 * most]
     ends, hits = ends.take(order), hits[order]
     curvature, _ = slopes(meter, ends, 1.0, both_sides=True)
-    covariance = np.linalg.inv(positive(curvature))
+    covariance = inverse(curvature)
     kept: list[int] = []
     counts: list[int] = []
     for row in range(len(ends.theta)):

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from pbrl_model.inference.facets import ProbeOptions, facets, probed
 from pbrl_model.inference.importance import FEWEST, Seen, Weighted, flattened, teach
 from pbrl_model.inference.metered import Metered
-from pbrl_model.inference.mixture import Mixture, positive
+from pbrl_model.inference.mixture import Mixture, inverse, positive
 from pbrl_model.inference.modes import NEGLIGIBLE, SAME, Modes, distances
 from pbrl_model.inference.population import Walked, WalkOptions, learned, populate, wander
 from pbrl_model.inference.problem import Domain, Problem
@@ -98,7 +98,7 @@ def walked_shapes(
             out.append(known)
             continue
         seen = learned(rng, walked.points, meter.domain, walk.components)
-        scale = np.linalg.inv(np.einsum("k,kij->ij", seen.weight, seen.scale))
+        scale = inverse(np.einsum("k,kij->ij", seen.weight, seen.scale))
         out.append(joined([known, seen, facets(meter, walked.last, scale, probe)], (1 / 3, 1 / 3, 1 / 3)))
     return out
 
