@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from pbrl_model.contact_world import CONTACT_COLUMNS, contact_scene, rollout_contact
 from pbrl_model.geometry import MassProperties
-from pbrl_model.pose_kernel import simulate_parallel, simulate_serial
 from pbrl_model.rollout import KERNEL_LOCK, com_to_origin
+from pbrl_model.window_kernel import simulate_parallel, simulate_serial
 from pbrl_model.windows import Windows
 
 Array = NDArray[np.float64]
 
 EngineName = Literal["kernel", "pymunk"]
 
-SERIAL_STEPS = 40_000
+SERIAL_STEPS = 150_000
 """Below this many body steps in all, waking the other cores costs more than it saves."""
 
 
@@ -56,9 +56,9 @@ class KernelEngine:
     """The compiled kernel, on all cores where that pays.
 
     Attributes:
-        forcing: (W, T, 8), see `pose_kernel`.
+        forcing: (W, T, 8), see `window_kernel`.
         place: (W, N) where each pose lies, in steps.
-        constants: (5,), see `pose_kernel`.
+        constants: (5,), see `window_kernel`.
     """
 
     def __init__(self, body: MassProperties, windows: Windows) -> None:

@@ -220,11 +220,7 @@ def _fit_object(rng: np.random.Generator, recording: Recording, name: str, optio
     if options.engine == "pymunk":
         target = target.over(target.likelihood.with_engine(partial(PymunkEngine, footprint=geometry.footprint)))
         modes = Modes(target.evaluate(modes.point.position, modes.point.linear.nuisance), modes.covariance)
-    if options.sampler == "metropolis":
-        count = {"count": options.chains, "burn_in": options.burn_in, "draws": options.draws, "thin": options.thin}
-        found = chains(rng, target, modes, **count)
-    else:
-        found = weighted(rng, target, modes, draws=options.chains * options.draws)
+    found = _sampled(rng, target, modes, options)
     body = target.likelihood.body
     posterior = _posterior(name, target, found, options)
     heldout = _heldout(rng, parts, posterior, geometry, body)
@@ -236,6 +232,18 @@ def _fit_object(rng: np.random.Generator, recording: Recording, name: str, optio
     if target.likelihood.with_drag:
         notes += note_on_left_out(noise, target.left_out_force) + note_on_delay(delay)
     return ObjectFit(replace(posterior, notes=notes), noise, delay, found.acceptance, heldout, motions, body)
+
+
+def _sampled(rng: np.random.Generator, target: Target, modes: Modes, options: FitOptions) -> Sampled:
+    """Draw from the posterior; chains stand in where weights collapse on so few draws that they show no spread."""
+    notes: tuple[str, ...] = ()
+    if options.sampler == "importance":
+        found = weighted(rng, target, modes, draws=options.chains * options.draws)
+        if found.converged:
+            return found
+        notes = found.notes
+    count = {"count": options.chains, "burn_in": options.burn_in, "draws": options.draws, "thin": options.thin}
+    return replace(chains(rng, target, modes, **count), notes=notes)
 
 
 @dataclass(frozen=True)

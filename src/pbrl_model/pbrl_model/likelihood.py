@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_model.engines import SERIAL_STEPS, KernelEngine, MakeEngine, lever
+from pbrl_model.engines import KernelEngine, MakeEngine, lever
 from pbrl_model.geometry import MassProperties
 from pbrl_model.marginal_kernel import FORCE_STEP, NUISANCES, START_STEP, marginal_parallel, marginal_serial
 from pbrl_model.rollout import KERNEL_LOCK
@@ -32,6 +32,8 @@ from pbrl_model.windows import Windows
 
 Array = NDArray[np.float64]
 
+SERIAL_STEPS = 20_000
+"""Below this many body steps in a linearisation of all rows, waking the other cores costs more than it saves."""
 ROUNDS = 4
 """Linearisations at most on the way to the most likely nuisances of a window."""
 

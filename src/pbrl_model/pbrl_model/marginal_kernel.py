@@ -16,7 +16,8 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from pbrl_model.kernel import HINGE_RADIUS
-from pbrl_model.pose_kernel import simulate_window
+from pbrl_model.lane_kernel import LANES, SIZE
+from pbrl_model.window_kernel import simulate_starts
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -98,7 +99,7 @@ def marginal_window(
         root: (6, 6) its covariance is root root^T.
         drag: scale of the left-out force [N].
         sigma: scale of the noise.
-        late: see `simulate_window`, and so are those up to `constants`.
+        late: see `simulate_starts`, and so are those up to `constants`.
         forcing: (T, 8).
         steps: of the window.
         place: (N,).
@@ -110,10 +111,15 @@ def marginal_window(
         z: (9,) where the climb begins and, on return, where it ended.
     """
     poses, longest = place.shape[0], forcing.shape[0]
-    force, path = np.empty((longest, 3)), np.empty((longest + 1, 3))
-    base, moved = np.empty((poses, 3)), np.empty((poses, 3))
+    lanes, path = np.empty(SIZE), np.empty((longest + 1, 3, LANES))
+    starts, offsets, many = (
+        np.empty((1 + NUISANCES, 6)),
+        np.empty((1 + NUISANCES, 3)),
+        np.empty((1 + NUISANCES, poses, 3)),
+    )
+    lane = np.zeros(NUISANCES, dtype=np.int64)  # which of them each nuisance moves; 0: none, its effect is known
     by_state, slope = np.zeros((3 * poses, 6)), np.zeros((3 * poses, NUISANCES))
-    residual, start, offset, spread = np.empty(3 * poses), np.empty(6), np.empty(3), np.empty(6)
+    residual, spread = np.empty(3 * poses), np.empty(6)
     factor = np.empty((NUISANCES, NUISANCES))
     aim, trial, scale = np.empty(NUISANCES), z.copy(), np.ones(NUISANCES)
     scale[6:] = drag
@@ -121,13 +127,37 @@ def marginal_window(
     for k in range(6):
         spread[k] = math.sqrt(np.sum(root[k] * root[k]))
     in_world = math.isnan(parameters[HINGE_RADIUS])  # no joint: moving the start moves every pose alike
+    used = 1
+    for k in range(NUISANCES):
+        if with_drag if k >= 6 else spread[k] > 0.0 and not (k < 2 and in_world):
+            lane[k] = used
+            used += 1
     misfit, predicted, log_det, value, share = math.inf, 0.0, 0.0, -math.inf, 1.0
     linearised = 0
     while True:
+        # All at once, wanted or not: eight lanes take no longer than one.
         for k in range(6):
-            start[k] = mean[k] + np.dot(root[k], trial[:6])
-        offset[:] = trial[6:]
-        simulate_window(parameters, start, offset, late, forcing, steps, place, constants, force, path, base)
+            starts[:used, k] = mean[k] + np.dot(root[k], trial[:6])
+        offsets[:used] = trial[6:]
+        for k in range(NUISANCES):
+            if lane[k] > 0 and k < 6:
+                starts[lane[k], k] += START_STEP * spread[k]
+            elif lane[k] > 0:
+                offsets[lane[k], k - 6] += FORCE_STEP
+        simulate_starts(
+            parameters,
+            starts[:used],
+            offsets[:used],
+            late,
+            forcing,
+            steps,
+            place,
+            constants,
+            lanes,
+            path,
+            many[:used],
+        )
+        base = many[0]
         count, found = 0, 0.0
         for n in range(poses):
             for k in range(3):
@@ -153,28 +183,20 @@ def marginal_window(
                 continue
         misfit = found
         z[:] = trial
-        for k in range(6):
+        for k in range(NUISANCES):
             if k < 2 and in_world:
                 for n in range(poses):
                     by_state[3 * n + k, k] = weight[n, k]
-            elif spread[k] > 0.0:
-                size = START_STEP * spread[k]
-                start[k] += size
-                simulate_window(parameters, start, offset, late, forcing, steps, place, constants, force, path, moved)
-                start[k] -= size
+            elif lane[k] > 0:
+                size = START_STEP * spread[k] if k < 6 else FORCE_STEP
                 for n in range(poses):
                     for other in range(3):
-                        by_state[3 * n + other, k] = (moved[n, other] - base[n, other]) * weight[n, other] / size
+                        change = (many[lane[k], n, other] - base[n, other]) * weight[n, other] / size
+                        if k < 6:
+                            by_state[3 * n + other, k] = change
+                        else:
+                            slope[3 * n + other, k] = change
         slope[:, :6] = by_state @ root
-        if with_drag:
-            for k in range(3):
-                offset[k] += FORCE_STEP
-                simulate_window(parameters, start, offset, late, forcing, steps, place, constants, force, path, moved)
-                offset[k] -= FORCE_STEP
-                for n in range(poses):
-                    for other in range(3):
-                        change = (moved[n, other] - base[n, other]) * weight[n, other]
-                        slope[3 * n + other, 6 + k] = change / FORCE_STEP
         linearised += 1
         # What the residual would be with no nuisance, to first order, and how much of it nuisances explain.
         residual += slope @ z

@@ -30,6 +30,8 @@ LEAST_SHARE = 0.05
 """No mode starts with less of the draws, over those of the largest, however little its Gaussian holds."""
 HOPELESS = 60.0
 """Modes this much below the best are not climbed from [nat]: least squares may have left a climb of a tenth of it."""
+HOPELESS_ESS = 5.0
+"""Weights that have collapsed on fewer effective samples than this are not helped by twice the effort."""
 WIDER = 1.5
 """The mixture's first components are this much wider than the curvature at the modes says, in variance."""
 
@@ -55,6 +57,11 @@ class Sampled:
     pareto_k: float
     acceptance: Array
     notes: tuple[str, ...] = ()
+
+    @property
+    def converged(self) -> bool:
+        """Tell whether importance weights gave an evidence."""
+        return math.isfinite(self.log_evidence)
 
 
 def shares(modes: Modes) -> Array:
@@ -132,7 +139,7 @@ def weighted(rng: np.random.Generator, target: Target, modes: Modes, *, draws: i
             rounds=LEARNING_ROUNDS,
             defence=defence,
         )
-        if _trusted(found):
+        if _trusted(found) or found.ess < HOPELESS_ESS:
             break
         mixture = found.mixture
     position = coordinates.describe(rng, found.resampled(rng, draws))
@@ -141,7 +148,7 @@ def weighted(rng: np.random.Generator, target: Target, modes: Modes, *, draws: i
     if not _trusted(found):
         notes = (
             f"the evidence did not converge ({found.ess:.0f} effective samples, Pareto k {found.pareto_k:.2f}): "
-            "it is not given, and the spreads are less sure than they look",
+            "it is not given, and the draws are those of Metropolis chains",
         )
         evidence = error = math.nan
     return Sampled(position[None], evidence, error, found.ess, found.pareto_k, np.full((1, 2), np.nan), notes)
