@@ -116,6 +116,23 @@ def test_a_fit_at_once_is_gone_on_from(recording: Recording, make_recording: Mak
     assert deviations(after)["wheel_x"] < 1.2 * deviations(found.posterior)["wheel_x"]
 
 
+def test_data_that_change_change_the_mind(make_recording: Maker) -> None:
+    """Another caster is locked in the second episode, and the first is beyond what is kept."""
+    learner = OnlineLearner(replace(OPTIONS, most_windows=5))
+    places = np.array([[-0.65, 0.3], [0.65, -0.3]])
+    for number, place in enumerate(places):
+        truth = BodyParameters(mass=33.0, wheel_x=place[0], wheel_y=place[1], mu_x=0.4, mu_y=0.4)
+        learner.new_clock()
+        learner.update(make_recording(7 + number, seconds=9.0, rolling=4.0, truth=truth), at_the_end=True)
+        posterior = learner.posteriors()["table"]
+        columns = np.stack([posterior.column(name).ravel() for name in ("wheel_x", "wheel_y")], -1)
+        off = np.abs(columns.mean(axis=0) - place)
+        assert np.all(off < 3.0 * columns.std(axis=0)) and np.linalg.norm(off) < 0.2
+    learned = learner.objects["table"].learned
+    assert learned.windows is not None
+    assert (len(learned.windows), learned.seen, learned.episodes) == (5, 12, 2)
+
+
 def test_nothing_felt_is_no_posterior(recording: Recording) -> None:
     felt = recording.wrenches["left"]
     numb = replace(recording, wrenches={"left": WrenchStream(felt.time, 0.0 * felt.force, 0.0 * felt.torque)})
