@@ -13,7 +13,7 @@ from pbrl_bag.types import PoseStream, Recording
 from pbrl_bringup.experiments.contact import Trial, rows_of
 from pbrl_bringup.experiments.contact_cases import HELD, PUSHED, Case, random_case, rotation, until
 from pbrl_bringup.experiments.contact_figure import draw
-from pbrl_model.contact_fit import ContactFit, ContactOptions, fit_contact
+from pbrl_model.contact.fit import ContactFit, ContactOptions, fit_contact
 from pbrl_model.errors import ModelError
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from pbrl_bag import BodyGeometry, Recording
 from pbrl_model.geometry import MassProperties
 from pbrl_model.posterior import Posterior
 from pbrl_model.predict import predict, predict_windows, unlearned
-from pbrl_model.sensing import Motion
-from pbrl_model.windows import shooting_windows
+from pbrl_model.sensing.motion import Motion
+from pbrl_model.sensing.windows import shooting_windows
 
 Array = NDArray[np.float64]
 

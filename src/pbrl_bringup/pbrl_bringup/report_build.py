@@ -37,7 +37,7 @@ from pbrl_bringup.verdict import (
     spread_radius,
     wheel_verdict,
 )
-from pbrl_model.heldout import Heldout
+from pbrl_model.fitting.heldout import Heldout
 from pbrl_model.posterior import Posterior
 from pbrl_model.priors import table2_prior
 

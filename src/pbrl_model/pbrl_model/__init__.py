@@ -1,8 +1,8 @@
 """The world model: pymunk world, compiled kernel, priors, likelihood, inference; model_node."""
 
 from pbrl_model.errors import ModelError
-from pbrl_model.fit import Fit, ObjectFit, fit_recording, motions_of
-from pbrl_model.fit_options import FitOptions
+from pbrl_model.fitting.fit import Fit, ObjectFit, fit_recording, motions_of
+from pbrl_model.fitting.options import FitOptions
 from pbrl_model.parameters import BodyParameters
 from pbrl_model.posterior import Posterior
 from pbrl_model.predict import Prediction, predict, unlearned

@@ -12,8 +12,8 @@ from pbrl_bag.types import BodyGeometry
 from pbrl_model.geometry import MassProperties
 from pbrl_model.parameters import BodyParameters
 from pbrl_model.rollout import rollout
-from pbrl_model.sensing import Motion
-from pbrl_model.windows import Windows, whole_windows
+from pbrl_model.sensing.motion import Motion
+from pbrl_model.sensing.windows import Windows, whole_windows
 
 Array = NDArray[np.float64]
 

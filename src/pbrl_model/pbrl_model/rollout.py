@@ -12,7 +12,8 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pbrl_model import kernel, lane_kernel, rollout_kernel
+from pbrl_model import kernel
+from pbrl_model.engines import lane_kernel, rollout_kernel
 from pbrl_model.errors import ModelError
 from pbrl_model.parameters import KERNEL_COLUMNS
 

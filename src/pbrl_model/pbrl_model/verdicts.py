@@ -11,7 +11,7 @@ from pbrl_model.diagnostics import convergence
 from pbrl_model.parameters import ANGLES
 from pbrl_model.posterior import Posterior
 from pbrl_model.priors import Prior
-from pbrl_model.sensing import Motion
+from pbrl_model.sensing.motion import Motion
 from pbrl_model.symmetry import canonical_wheel
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from pbrl_bringup.experiments.household import DT, PUSH_STEPS, gather, load_hous
 from pbrl_model.errors import ModelError
 from pbrl_model.geometry import mass_properties
 from pbrl_model.parameters import KERNEL_COLUMNS
-from pbrl_model.transition_problem import simulate
+from pbrl_model.transitions.problem import simulate
 
 VALUES: dict[str, Any] = {
     "objects": {"box": {"footprint": [[0, 0], [1, 0], [1, 1], [0, 1]], "push": {"force": 5.0, "torque": 1.0}}},

@@ -13,7 +13,7 @@ from pbrl_bringup.experiments.accuracy import learn_linear, r_squared, training_
 from pbrl_bringup.experiments.figures import save
 from pbrl_bringup.experiments.household import load_household
 from pbrl_bringup.experiments.sample_efficiency import GOAL, JUDGED, MOST, NEVER, observations_needed
-from pbrl_model.transitions import BodyTransitions, displaced
+from pbrl_model.transitions.data import BodyTransitions, displaced
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pbrl_model.transitions import Transitions
+from pbrl_model.transitions.data import Transitions
 
 MASS, INERTIA = np.array([4.0, 9.0]), np.array([0.5, 2.0])
 SECONDS = 0.4

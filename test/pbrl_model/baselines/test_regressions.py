@@ -13,7 +13,7 @@ from pbrl_model.baselines.local import BANDWIDTHS, LocallyWeightedRegression, Lo
 from pbrl_model.baselines.object_oriented import ObjectOrientedRegression
 from pbrl_model.baselines.sectors import ContactSectors
 from pbrl_model.errors import ModelError
-from pbrl_model.transitions import Transitions, turn
+from pbrl_model.transitions.data import Transitions, turn
 
 Array = NDArray[np.float64]
 Maker = Callable[[int, int], Transitions]

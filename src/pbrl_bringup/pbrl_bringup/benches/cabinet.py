@@ -12,7 +12,7 @@ from pbrl_bag import Recording, read_recording
 from pbrl_bringup.benches.rows import Measured, at_most, within
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.paths import config_file, workspace
-from pbrl_model.fit import FitOptions, ObjectFit, fit_recording, motions_of
+from pbrl_model.fitting.fit import FitOptions, ObjectFit, fit_recording, motions_of
 from pbrl_model.predict import predict, unlearned
 
 Array = NDArray[np.float64]

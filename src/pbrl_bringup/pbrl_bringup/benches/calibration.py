@@ -1,7 +1,7 @@
 """Simulation-based calibration of the fit (Talts et al. 2018), for every model class; `figure.png` has the histograms.
 
 Whatever the fit takes as unknown is drawn from its own prior, data are drawn from the model, and the truth is ranked
-among the posterior's draws. See `pbrl_model.calibration` and `pbrl_model.inference.sbc`.
+among the posterior's draws. See `pbrl_model.fitting.calibration` and `pbrl_model.inference.sbc`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.stats import binom
 
 from pbrl_bringup.benches.rows import Measured, Row, at_least
 from pbrl_bringup.parallel import in_parallel
-from pbrl_model.calibration import RANKED, Trial, run_trial
+from pbrl_model.fitting.calibration import RANKED, Trial, run_trial
 from pbrl_model.inference.sbc import Ranks, Uniformity, judge
 
 CLASSES = ("free", "wheel", "wheel+ground", "hinge")

@@ -17,8 +17,8 @@ import pymunk
 from numpy.typing import NDArray
 
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
-from pbrl_model.contact_world import ContactScene, contact_scene, rollout_contact, start_states
 from pbrl_model.distributions import Uniform
+from pbrl_model.engines.contact_world import ContactScene, contact_scene, rollout_contact, start_states
 from pbrl_model.geometry import mass_properties
 from pbrl_model.inference.infer import infer
 from pbrl_model.inference.open_loop import OpenLoop

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pbrl_bringup.benches.pose_tables import Table, random_table, record
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most, within
 from pbrl_bringup.parallel import in_parallel
-from pbrl_model.fit import FitOptions, ObjectFit, fit_recording
+from pbrl_model.fitting.fit import FitOptions, ObjectFit, fit_recording
 from pbrl_model.symmetry import circular_mean, wrap
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from pbrl_bringup.report_data import Report
 from pbrl_bringup.report_page import number, rounded, write_page
 from pbrl_bringup.terminal import output, say, table
 from pbrl_model.arviz_bridge import save_posterior
-from pbrl_model.fit import Fit, FitOptions, fit_recording
+from pbrl_model.fitting.fit import Fit, FitOptions, fit_recording
 from pbrl_model.prior_options import load_prior_options
 
 

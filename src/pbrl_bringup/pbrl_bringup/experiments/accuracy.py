@@ -16,8 +16,8 @@ from pbrl_bag.types import BodyGeometry
 from pbrl_bringup.experiments.household import HouseholdObject, gather
 from pbrl_model.baselines.linear import LinearRegressor
 from pbrl_model.baselines.local import LocalRegressor
-from pbrl_model.transition_model import LearnOptions, TransitionPosterior, learn_body
-from pbrl_model.transitions import BodyTransitions, displaced, displacements, observed
+from pbrl_model.transitions.data import BodyTransitions, displaced, displacements, observed
+from pbrl_model.transitions.model import LearnOptions, TransitionPosterior, learn_body
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.experiments.contact_cases import PUSHED, random_case
 from pbrl_bringup.experiments.contact_figure import draw
 from pbrl_bringup.parallel import in_parallel
-from pbrl_model.contact_fit import ContactFit, ContactOptions, fit_contact
-from pbrl_model.contact_pair import PAIR_NAMES
+from pbrl_model.contact.fit import ContactFit, ContactOptions, fit_contact
+from pbrl_model.contact.pair import PAIR_NAMES
 
 Array = NDArray[np.float64]
 

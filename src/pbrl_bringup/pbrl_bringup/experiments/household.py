@@ -23,7 +23,7 @@ from pbrl_model.errors import ModelError
 from pbrl_model.geometry import check_polygon, mass_properties
 from pbrl_model.parameters import BodyParameters
 from pbrl_model.rollout import com_to_origin
-from pbrl_model.transitions import Transitions
+from pbrl_model.transitions.data import Transitions
 from pbrl_model.world import BodySpec, PhysicsWorld
 
 Array = NDArray[np.float64]

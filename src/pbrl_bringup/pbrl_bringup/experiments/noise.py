@@ -29,7 +29,7 @@ from pbrl_bringup.experiments.accuracy import (
 from pbrl_bringup.experiments.figures import band, canvas, save
 from pbrl_bringup.experiments.household import load_household
 from pbrl_bringup.parallel import in_parallel
-from pbrl_model.transitions import BodyTransitions
+from pbrl_model.transitions.data import BodyTransitions
 
 Array = NDArray[np.float64]
 

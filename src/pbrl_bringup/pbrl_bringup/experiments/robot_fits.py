@@ -24,8 +24,8 @@ from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.experiments.robot_fits_figure import draw
 from pbrl_bringup.experiments.robot_fits_trials import Case, Trial, record, run_trial
 from pbrl_bringup.parallel import in_parallel
-from pbrl_model.fit import FitOptions
-from pbrl_model.fit_options import LikelihoodName
+from pbrl_model.fitting.fit import FitOptions
+from pbrl_model.fitting.options import LikelihoodName
 
 SEEDS, QUICK_SEEDS = 5, 1
 NEAR = 0.05  # [m] the wheel counts as found

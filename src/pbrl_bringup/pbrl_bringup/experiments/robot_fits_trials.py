@@ -17,11 +17,11 @@ from pbrl_bringup.benches.wheel import locked_contacts
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.simulate import simulate_push
 from pbrl_control.push_plan import load_plan
-from pbrl_model.fit import FitOptions, fit_recording, motions_of
+from pbrl_model.fitting.fit import FitOptions, fit_recording, motions_of
 from pbrl_model.geometry import MassProperties, mass_properties
 from pbrl_model.posterior import Posterior
 from pbrl_model.predict import predict, unlearned
-from pbrl_model.sensing import Motion
+from pbrl_model.sensing.motion import Motion
 from pbrl_model.symmetry import THETA_PERIOD, wrap
 
 Array = NDArray[np.float64]

@@ -41,8 +41,8 @@ from pbrl_bringup.experiments.accuracy import (
 from pbrl_bringup.experiments.figures import canvas, save
 from pbrl_bringup.experiments.household import load_household
 from pbrl_bringup.parallel import in_parallel
-from pbrl_model.transition_model import TransitionPosterior
-from pbrl_model.transitions import BodyTransitions
+from pbrl_model.transitions.data import BodyTransitions
+from pbrl_model.transitions.model import TransitionPosterior
 
 Array = NDArray[np.float64]
 

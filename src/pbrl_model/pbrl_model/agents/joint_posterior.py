@@ -21,12 +21,12 @@ from pbrl_model.agents.models import learn_options
 from pbrl_model.agents.obstacles import edges, obstacles_of, placed
 from pbrl_model.agents.planning import Planner, Space
 from pbrl_model.agents.room import ITERATIONS, Push, contact_world
-from pbrl_model.contact_world import rollout_contact
 from pbrl_model.distributions import LogNormal, TruncatedNormal
+from pbrl_model.engines.contact_world import rollout_contact
 from pbrl_model.inference.mixture import stratified
-from pbrl_model.transition_classes import transition_class
-from pbrl_model.transition_model import LearnOptions, TransitionPosterior, learn_body
-from pbrl_model.transitions import concatenate, state_scale
+from pbrl_model.transitions.classes import transition_class
+from pbrl_model.transitions.data import concatenate, state_scale
+from pbrl_model.transitions.model import LearnOptions, TransitionPosterior, learn_body
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from pbrl_model.baselines.object_oriented import ObjectOrientedRegression
 from pbrl_model.baselines.sectors import ContactSectors
 from pbrl_model.parameters import BodyParameters
 from pbrl_model.prior_options import GroundOptions, PriorOptions
-from pbrl_model.transition_model import LearnOptions, TransitionPosterior, learn, update
-from pbrl_model.transitions import Transitions, concatenate, displacements
+from pbrl_model.transitions.data import Transitions, concatenate, displacements
+from pbrl_model.transitions.model import LearnOptions, TransitionPosterior, learn, update
 
 Array = NDArray[np.float64]
 

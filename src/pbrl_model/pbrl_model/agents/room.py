@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_model.agents.domain import DT, Domain, Scene
-from pbrl_model.contact_world import ContactScene, contact_scene, rollout_contact
-from pbrl_model.transitions import Transitions, observed
+from pbrl_model.engines.contact_world import ContactScene, contact_scene, rollout_contact
+from pbrl_model.transitions.data import Transitions, observed
 
 Array = NDArray[np.float64]
 

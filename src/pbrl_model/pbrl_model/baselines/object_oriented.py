@@ -17,7 +17,7 @@ from pbrl_model.baselines.local import BANDWIDTH, NEIGHBOURS, LocalRegressor
 from pbrl_model.baselines.per_body import check_bodies, check_some
 from pbrl_model.baselines.sectors import ContactSectors
 from pbrl_model.errors import ModelError
-from pbrl_model.transitions import Transitions, body_features, checked_action, concatenate, displaced
+from pbrl_model.transitions.data import Transitions, body_features, checked_action, concatenate, displaced
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

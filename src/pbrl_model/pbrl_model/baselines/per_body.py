@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pbrl_model.errors import ModelError
-from pbrl_model.transitions import Transitions, body_features, checked_action, displaced
+from pbrl_model.transitions.data import Transitions, body_features, checked_action, displaced
 
 Array = NDArray[np.float64]
 

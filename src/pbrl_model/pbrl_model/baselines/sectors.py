@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pbrl_model.errors import ModelError
 from pbrl_model.geometry import check_polygon, mass_properties
-from pbrl_model.transitions import turn
+from pbrl_model.transitions.data import turn
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -29,9 +29,9 @@ from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.stopping import ended_by_signals, init_until_signal, spin_until
 from pbrl_bag.types import BodyGeometry, Recording
 from pbrl_model.errors import ModelError
-from pbrl_model.fit import Fit, FitOptions, ObjectFit, fit_recording
-from pbrl_model.online import OnlineLearner, OnlineOptions, adopted
-from pbrl_model.online_state import Stored, load_all, prepare, save
+from pbrl_model.fitting.fit import Fit, FitOptions, ObjectFit, fit_recording
+from pbrl_model.online.learner import OnlineLearner, OnlineOptions, adopted
+from pbrl_model.online.state import Stored, load_all, prepare, save
 from pbrl_model.posterior import Posterior
 from pbrl_model.prior_options import PriorOptions, load_prior_options
 from pbrl_model.ros.conversions import models_to_msg

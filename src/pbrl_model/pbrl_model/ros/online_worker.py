@@ -10,13 +10,13 @@ from pathlib import Path
 
 from pbrl_bag.errors import BagError
 from pbrl_model.errors import ModelError
-from pbrl_model.live import LiveRecording
-from pbrl_model.online import ObjectLearner, OnlineLearner
-from pbrl_model.online_state import Stored, save
-from pbrl_model.online_windows import CONTEXT, SILENCE
+from pbrl_model.online.learner import ObjectLearner, OnlineLearner
+from pbrl_model.online.live import LiveRecording
+from pbrl_model.online.state import Stored, save
+from pbrl_model.online.windows import CONTEXT, SILENCE
 from pbrl_model.posterior import Posterior
 from pbrl_model.ros.listener import RecordingListener
-from pbrl_model.sensing import MARGIN
+from pbrl_model.sensing.motion import MARGIN
 
 QUIET = 2.0
 """Nothing heard for so long [s]: the data have come to their end, and what is there is all there is."""

@@ -1,0 +1,1 @@
+"""Learning of a body that was only touched by another one."""

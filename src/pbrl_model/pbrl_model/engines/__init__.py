@@ -1,0 +1,1 @@
+"""What simulates: bodies in lanes, poses at recorded times, Chipmunk where things touch."""

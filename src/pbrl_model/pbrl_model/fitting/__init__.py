@@ -1,0 +1,1 @@
+"""From motions to a posterior: density, modes, samplers, held-out test."""

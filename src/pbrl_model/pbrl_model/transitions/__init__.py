@@ -1,0 +1,1 @@
+"""Learning from states before and after actions, as the regressions do (thesis section 5.3)."""
