@@ -7,6 +7,7 @@ from pbrl_bag.info import BagInfo, TopicInfo, describe
 from pbrl_bag.mapping import Mapping, load_mapping
 from pbrl_bag.qos import Qos
 from pbrl_bag.reader import read_recording
+from pbrl_bag.recording_writer import write_recording
 from pbrl_bag.types import BodyGeometry, Grasp, PoseStream, Recording, WrenchStream
 from pbrl_bag.writer import BagWriter
 
@@ -28,4 +29,5 @@ __all__ = [
     "describe",
     "load_mapping",
     "read_recording",
+    "write_recording",
 ]
