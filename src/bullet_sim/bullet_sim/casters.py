@@ -89,17 +89,21 @@ class LinkTable:
         *,
         turn: float = 0.0,
         rigid: bool = False,
+        joint: int = bullet.JOINT_REVOLUTE,
+        centre: Sequence[float] = (0, 0, 0),
     ) -> int:
-        """Append one link on a revolute or rigid joint and give its number.
+        """Append one link and give its number.
 
         Args:
-            mass: [kg], centred on the joint.
+            mass: [kg].
             shapes: Bullet's numbers of the collision and the visual shape, -1 for none.
             place: (3,) [m] of the joint in the parent's frame.
             parent: number of the parent link, -1 for the base.
             axis: (3,) of the joint.
-            turn: of a rigid link against its parent about the vertical [rad].
+            turn: of the link against its parent about the vertical [rad].
             rigid: whether the joint does not move.
+            joint: Bullet's kind of the joint otherwise.
+            centre: (3,) [m] of the mass in the link's frame.
         """
         number = len(self.columns["linkMasses"])
         row = {
@@ -108,10 +112,10 @@ class LinkTable:
             "linkVisualShapeIndices": shapes[1],
             "linkPositions": list(place),
             "linkOrientations": yaw_quaternion(turn).tolist(),
-            "linkInertialFramePositions": [0, 0, 0],
+            "linkInertialFramePositions": list(centre),
             "linkInertialFrameOrientations": [0, 0, 0, 1],
             "linkParentIndices": parent + 1,
-            "linkJointTypes": bullet.JOINT_FIXED if rigid else bullet.JOINT_REVOLUTE,
+            "linkJointTypes": bullet.JOINT_FIXED if rigid else joint,
             "linkJointAxis": list(axis),
         }
         for key, value in row.items():
@@ -180,6 +184,7 @@ class Casters:
     Attributes:
         links: the casters in the order of `loads`.
         loads: (n,) smoothed normal force [N] under each wheel.
+        levers: (n,) of the rolling resistance [m] where each wheel is now.
     """
 
     def __init__(
@@ -202,6 +207,7 @@ class Casters:
         """
         self.links = tuple(links)
         self.loads: Array = np.full(len(self.links), share)
+        self.levers: Array = np.full(len(self.links), settings.rolling_resistance)
         self._client, self._body, self._settings = client, client.body(body), settings
         self._rolling = [caster for caster in self.links if not caster.locked]
         self._index = {caster.wheel: number for number, caster in enumerate(self.links)}
@@ -259,8 +265,8 @@ class Casters:
         self.loads = self._keep * self.loads + (1 - self._keep) * seen
         wheels = [caster.wheel for caster in self._rolling]
         if wheels:
-            lever = self._settings.rolling_resistance
-            torques = [lever * float(self.loads[self._index[wheel]]) for wheel in wheels]
+            resisting = self.levers * self.loads
+            torques = [float(resisting[self._index[wheel]]) for wheel in wheels]
             api.setJointMotorControlArray(
                 self._body, wheels, bullet.VELOCITY_CONTROL, targetVelocities=[0.0] * len(wheels), forces=torques
             )

@@ -1,4 +1,4 @@
-"""What stands in a room: tables and carts on casters, blocks that slide, fixtures that do not move.
+"""What stands in a room: tables and carts on casters, plain tables, blocks that slide, fixtures that do not move.
 
 A body's own frame has its origin where its tag is glued, x forward and y left; outlines are seen from above.
 """
@@ -15,6 +15,9 @@ from shapely.geometry import Point, Polygon
 from bullet_sim.settings import NonNegative, Outline, Positive, Settings, Vector2, Vector3
 
 Array = NDArray[np.float64]
+
+FOOT_RADIUS = 0.02
+"""Of a ball foot [m]."""
 
 
 class CasterSettings(Settings):
@@ -193,6 +196,55 @@ class UtilityCart(OnCasters):
         return self.shelf[0] / 2 - self.caster_inset, self.shelf[1] / 2 - self.caster_inset
 
 
+class PlainTable(Settings):
+    """A table in the model's own class: mass spread evenly over its outline, on feet without friction.
+
+    Its feet are balls that bear on one point each, as ball transfer units do. What it lacks (friction, casters, a
+    load) can be concealed in it, one thing at a time.
+
+    Attributes:
+        size: extent along the body's x and y [m].
+        height: top face above the floor [m].
+        nominal_mass: what the robot is told [kg].
+        pose: (x, y, theta) of the tag, which is glued on the middle of the top.
+        slab: thickness of the top [m]; its edge is what a gripper clamps.
+        leg_inset: from the edges to the legs' middle [m].
+    """
+
+    kind: Literal["plain_table"]
+    size: tuple[Positive, Positive]
+    height: Positive = 0.7775
+    nominal_mass: Positive
+    pose: Vector3
+    slab: Positive = 0.025
+    leg_inset: Positive = 0.06
+
+    @model_validator(mode="after")
+    def _stands(self) -> Self:
+        if self.height <= self.slab + 2 * FOOT_RADIUS:
+            raise ValueError(f"expected a height above feet and slab, got {self.height} m")
+        if min(self.size) <= 2 * self.leg_inset:
+            raise ValueError(f"expected a size of more than two leg insets, got {list(self.size)} m")
+        return self
+
+    @property
+    def footprint(self) -> Array:
+        """Corners (4, 2) [m] seen from above, counter-clockwise, in the body's frame."""
+        x, y = self.size[0] / 2, self.size[1] / 2
+        return np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
+
+    @property
+    def feet(self) -> dict[str, Vector2]:
+        """Where the feet are [m] by name in the body's frame; front is +x, left is +y."""
+        x, y = self.size[0] / 2 - self.leg_inset, self.size[1] / 2 - self.leg_inset
+        return {"front_left": (x, y), "front_right": (x, -y), "rear_left": (-x, y), "rear_right": (-x, -y)}
+
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Heights [m] between which the footprint is solid; below the top there is room."""
+        return self.height - self.slab, self.height
+
+
 class Block(Settings):
     """A prism that stands on the floor and slides when pushed.
 
@@ -247,4 +299,4 @@ class Fixture(Settings):
         return 0.0, self.height
 
 
-Body = Annotated[OfficeTable | UtilityCart | Block | Fixture, Field(discriminator="kind")]
+Body = Annotated[OfficeTable | UtilityCart | PlainTable | Block | Fixture, Field(discriminator="kind")]

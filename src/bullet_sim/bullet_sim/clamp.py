@@ -26,6 +26,12 @@ LEAST_HOLD = 0.020
 STEEPEST = math.radians(12.0)
 """Angle [rad] between plates and slab up to which rubber evens it out."""
 
+MAY_BE_ZERO = ("approach", "damping", "play")
+"""Fields of a gripper that need not be above zero."""
+
+LEAST = {"approach": -1.0}
+"""Bounds of fields that may be below zero."""
+
 
 @dataclass(frozen=True)
 class GripperSpec:
@@ -42,6 +48,7 @@ class GripperSpec:
         stiffness: of the rubber in shear and across [N/m].
         damping: ratio to the critical damping of a 5 kg mass on that spring.
         torque_limit: greatest moment about the plates' normal [N m].
+        play: way [m] in the plane of the plates, either side, over which they hold nothing.
     """
 
     approach: float = 1.0
@@ -54,10 +61,11 @@ class GripperSpec:
     stiffness: float = 2.0e4
     damping: float = 0.3
     torque_limit: float = 5.0
+    play: float = 0.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not math.isfinite(value) or (value <= 0 and name not in ("approach", "damping")) or self.damping < 0:
+            if not math.isfinite(value) or (value <= 0 and name not in MAY_BE_ZERO) or value < LEAST.get(name, 0.0):
                 raise SimError(f"gripper: {name}: expected a positive number, got {value}")
         if self.plate_end <= self.plate_start or abs(self.approach) != 1:
             raise SimError("gripper: expected plate_end beyond plate_start and approach +1 or -1")

@@ -17,6 +17,9 @@ from bullet_sim.window import BUILDERS, Window
 
 Array = NDArray[np.float64]
 
+FLOOR = "floor"
+"""Name of the body that everything stands on."""
+
 GRAVITY = 9.81
 """Standard acceleration of fall [m/s^2]."""
 
@@ -30,6 +33,21 @@ SOLVER_ITERATIONS = 60
 def yaw_quaternion(theta: float) -> Array:
     """Give the quaternion (4,) x y z w of a turn by `theta` [rad] about the vertical."""
     return np.array([0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2)])
+
+
+def multiply(first: Array, second: Array) -> Array:
+    """Give the quaternion (4,) x y z w of `second` followed by `first`, both about fixed axes."""
+    x1, y1, z1, w1 = first
+    x2, y2, z2, w2 = second
+    product = np.array(
+        [
+            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
+            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
+            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
+            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
+        ]
+    )
+    return product / np.linalg.norm(product)
 
 
 def cross(a: Sequence[float] | Array, b: Sequence[float] | Array) -> Array:
@@ -180,6 +198,16 @@ class BulletClient:
         self.bodies[name] = body
         self._links[name] = links
         return body
+
+    @property
+    def floor_friction(self) -> float:
+        """Factor on every sliding friction against the floor; 1 where there is none yet."""
+        return float(self.api.getDynamicsInfo(self.bodies[FLOOR], -1)[1]) if FLOOR in self.bodies else 1.0
+
+    def remove(self, name: str) -> None:
+        """Take a body out of the world; raise SimError for a name unknown."""
+        self.api.removeBody(self.body(name))
+        del self.bodies[name], self._links[name]
 
     def _joint_name(self, body: int, index: int) -> str:
         return str(self.api.getJointInfo(body, index)[1].decode())

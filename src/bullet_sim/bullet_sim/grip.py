@@ -1,13 +1,8 @@
 """A closed gripper: two compliant rubber plates that hold a table's edge, and slip when they are asked too much.
 
-Rubber is an elastic bristle in three translations and one turn about the plates' normal. In the plane of the
-plates the elastic load lies within a limit surface that couples force and moment,
-
-    (|f| / f_max)^2 + (tau / tau_max)^2 <= 1,        f_max = 2 mu F,
-
-beyond which the plates slip: load and deflection stay on the surface and the bristle's root is dragged along the
-edge. Across the plates the rubber is squeezed and does not slip. When too little of the edge is left between the
-plates, or it has left the opening, the grasp is lost.
+Rubber is an elastic bristle in three translations and one turn about the plates' normal. In the plane of the plates
+it slips beyond a limit surface, see `bristle.py`. Across the plates the rubber is squeezed and does not slip. When too
+little of the edge is left between the plates, or it has left the opening, the grasp is lost.
 """
 
 from __future__ import annotations
@@ -18,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bullet_sim.bristle import Bristle
 from bullet_sim.clamp import Clamp, GripperSpec, held_interval
 from bullet_sim.client import BulletClient, Pose, Twist, cross
 from bullet_sim.errors import SimError
@@ -25,9 +21,6 @@ from bullet_sim.furniture import Furniture
 from bullet_sim.quiet import bullet
 
 Array = NDArray[np.float64]
-
-REFERENCE_MASS = 5.0
-"""Mass [kg] for which the rubber's damping ratio is meant: about what an arm shows at its wrist."""
 
 LAST_HOLD = 0.005
 """Depth [m] of edge between the plates below which a slipping grasp is lost."""
@@ -56,7 +49,6 @@ class Grip:
     Attributes:
         clamp: the edge as it was when the plates closed.
         load: what was applied last.
-        slipped: way [m] the plates have slid over the edge so far.
         lost: whether the edge has left the plates; nothing is applied from then on.
     """
 
@@ -77,15 +69,19 @@ class Grip:
         """
         if not body.slabs or clamp.body != body.name:
             raise SimError(f"grip: expected a clamp on an edge of {body.name!r}, got one on {clamp.body!r}")
-        self.clamp, self.slipped, self.lost = clamp, 0.0, False
+        self.clamp, self.lost = clamp, False
         self._client, self._gripper, self._spec, self._body = client, gripper, spec, body
         self._slab = body.slab_at(clamp.contact)
         self._hand = spec.along(clamp.reach)  # where the bristle ends, in the gripper's frame
         self._root = clamp.contact.copy()  # where it begins, in the body's tag frame
-        self._turn = self._relative_turn(self._gripper_state()[0], body.pose())
-        self._damping = 2 * spec.damping * math.sqrt(spec.stiffness * REFERENCE_MASS)
-        self._lever2 = (spec.plate_width**2 + clamp.depth**2) / 12  # of a patch that carries evenly [m^2]
+        turn = self._relative_turn(self._gripper_state()[0], body.pose())
+        self._bristle = Bristle(spec, clamp.depth, (float(self._root[0]), float(self._root[1])), turn)
         self.load = GripLoad(np.zeros(3), np.zeros(3), body.pose().point(self._root), False)
+
+    @property
+    def slipped(self) -> float:
+        """Way [m] the plates have slid over the edge so far."""
+        return self._bristle.slipped
 
     def _gripper_state(self) -> tuple[Pose, Twist]:
         return self._client.link_twist(*self._gripper)
@@ -114,34 +110,20 @@ class Grip:
         hand_speed = hand_twist.linear + cross(hand_twist.angular, point - hand_pose.position)
         body_speed = twist.linear + cross(twist.angular, point - pose.position)
         speed = turn_back @ (hand_speed - body_speed)
-        twisted = _wrap(self._relative_turn(hand_pose, pose) - self._turn)
-        spin = float((turn_back @ (hand_twist.angular - twist.angular))[2])
-        force, torque, slipping = self._rubber(stretch, speed, twisted, spin)
-        self.load = GripLoad(pose.matrix @ force, pose.matrix @ [0.0, 0.0, torque], point, slipping)
+        twist_rate = float((turn_back @ (hand_twist.angular - twist.angular))[2])
+        force, torque = self._rubber(stretch, speed, self._relative_turn(hand_pose, pose), twist_rate)
+        self.load = GripLoad(pose.matrix @ force, pose.matrix @ [0.0, 0.0, torque], point, self._bristle.slipping)
         self._push()
         return self.load
 
-    def _rubber(self, stretch: Array, speed: Array, twisted: float, spin: float) -> tuple[Array, float, bool]:
-        """Give force (3,) and torque on the object in its own axes; slip by moving the bristle's root."""
-        spec, k, c = self._spec, self._spec.stiffness, self._damping
-        fraction = min(1.0, 1 / max(self._surface(k * stretch, k * self._lever2 * twisted), 1e-12))
-        slipping = fraction < 1
-        if slipping:
-            give = np.array([*(1 - fraction) * stretch[:2], 0.0])
-            self._root = self._root + give
-            self._turn += (1 - fraction) * twisted
-            self.slipped += float(np.hypot(give[0], give[1]))
-            stretch, twisted = stretch - give, fraction * twisted
-        force = k * stretch + c * speed
-        torque = self._lever2 * (k * twisted + c * spin)
-        back = max(1.0, self._surface(force, torque))
-        across = max(-2 * spec.force, min(2 * spec.force, float(force[2])))
-        return np.array([force[0] / back, force[1] / back, across]), torque / back, slipping
-
-    def _surface(self, force: Array, torque: float) -> float:
-        """Give how far a load is out on the limit surface: 1 on it, more beyond."""
-        limit = self._spec.force_limit
-        return math.hypot(force[0] / limit, force[1] / limit, torque / self._spec.torque_limit)
+    def _rubber(self, stretch: Array, speed: Array, turn: float, spin: float) -> tuple[Array, float]:
+        """Give force (3,) and torque on the object in its own axes; across the plates the rubber is squeezed."""
+        bristle, spec = self._bristle, self._spec
+        x, y = stretch[0] + self._root[0], stretch[1] + self._root[1]
+        force_x, force_y, torque = bristle.load(x, y, (speed[0], speed[1]), turn, spin)
+        self._root[:2] = bristle.root
+        across = spec.stiffness * stretch[2] + bristle.damping * speed[2]
+        return np.array([force_x, force_y, max(-2 * spec.force, min(2 * spec.force, across))]), torque
 
     def _push(self) -> None:
         """Hand the load to Bullet: on the object, and its opposite on the gripper."""
@@ -162,8 +144,3 @@ class Grip:
         start, end = (body.inverse_point(hand.point(spec.along(at))) for at in (spec.plate_start, spec.plate_end))
         low, high = held_interval(self._slab.outline, start, end)
         return (high - low) * (spec.plate_end - spec.plate_start) < LAST_HOLD
-
-
-def _wrap(angle: float) -> float:
-    """Bring an angle [rad] into [-pi, pi)."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi

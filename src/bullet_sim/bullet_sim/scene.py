@@ -15,8 +15,11 @@ from ament_index_python.packages import PackageNotFoundError, get_package_share_
 from pydantic import Field, model_validator
 from shapely.geometry import Point, Polygon
 
-from bullet_sim.catalogue import Body, OnCasters
+from bullet_sim.catalogue import Body
+from bullet_sim.concealed.checks import check_concealed
+from bullet_sim.concealed.options import Concealed
 from bullet_sim.errors import SimError, nearest
+from bullet_sim.placing import placed_footprint
 from bullet_sim.settings import (
     Fraction,
     NonNegative,
@@ -128,22 +131,6 @@ class Sensors(Settings):
     wrist_ft: WristSettings = WristSettings()
 
 
-class Concealed(Settings):
-    """What is true and not told; never on a topic, never in a recording. One key an effect, each by body name.
-
-    Attributes:
-        locked_casters: names of the casters whose wheel and swivel are both braked.
-        fixed_wheels: names of the casters that do not swivel: their wheels roll along the body's x alone.
-        mass: true mass [kg] where it is not the nominal one.
-        rolling_resistance: true lever f [m] of all casters of a body where it is not its `casters`' one.
-    """
-
-    locked_casters: dict[str, tuple[str, ...]] = Field(default_factory=dict)
-    fixed_wheels: dict[str, tuple[str, ...]] = Field(default_factory=dict)
-    mass: dict[str, Positive] = Field(default_factory=dict)
-    rolling_resistance: dict[str, NonNegative] = Field(default_factory=dict)
-
-
 class Scene(Settings):
     """One scene, known and concealed parts together."""
 
@@ -165,17 +152,7 @@ class Scene(Settings):
                 )
         if self.goal is not None:
             self._known_body(self.goal.object, "goal.object")
-        for effect in type(self.concealed).model_fields:
-            for name in getattr(self.concealed, effect):
-                self._known_body(name, f"concealed.{effect}")
-        for effect in ("locked_casters", "fixed_wheels"):
-            for name, casters in getattr(self.concealed, effect).items():
-                swivels = self._on_casters(name, effect).swivels
-                for caster in casters:
-                    if caster not in swivels:
-                        raise ValueError(f"concealed.{effect}.{name}: no caster {caster!r}; {nearest(caster, swivels)}")
-        for name in self.concealed.rolling_resistance:
-            self._on_casters(name, "rolling_resistance")
+        check_concealed(self.concealed, self.bodies)
         return self
 
     @model_validator(mode="after")
@@ -199,19 +176,6 @@ class Scene(Settings):
     def _known_body(self, name: str, place: str) -> None:
         if name not in self.bodies:
             raise ValueError(f"{place}: no body {name!r} in this scene; {nearest(name, self.bodies)}")
-
-    def _on_casters(self, name: str, effect: str) -> OnCasters:
-        body = self.bodies[name]
-        if not isinstance(body, OnCasters):
-            raise ValueError(f"concealed.{effect}.{name}: expected a body on casters, got a {body.kind}")
-        return body
-
-
-def placed_footprint(body: Body) -> Polygon:
-    """Give a body's footprint at its starting pose in `world`."""
-    x, y, theta = body.pose
-    cos, sin = np.cos(theta), np.sin(theta)
-    return Polygon(body.footprint @ np.array([[cos, sin], [-sin, cos]]) + [x, y])
 
 
 def load_scene(path: str | Path) -> Scene:

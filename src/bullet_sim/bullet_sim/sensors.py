@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from bullet_sim.client import Pose, yaw_quaternion
+from bullet_sim.client import Pose, multiply, yaw_quaternion
 from bullet_sim.scene import TagSettings, WristSettings
 
 Array = NDArray[np.float64]
@@ -86,12 +86,27 @@ class TagReading:
 class TagCamera:
     """An overhead camera that reads every tag at its rate, a latency later, sometimes missing one."""
 
-    def __init__(self, settings: TagSettings, rng: Generator) -> None:
-        """Set up with a bias field drawn from `rng`, which is kept for the noise."""
+    def __init__(
+        self,
+        settings: TagSettings,
+        rng: Generator,
+        *,
+        glued: Mapping[str, Callable[[Pose], Pose]] | None = None,
+        delays: Mapping[str, float] | None = None,
+    ) -> None:
+        """Set up with a bias field drawn from `rng`, which is kept for the noise.
+
+        Args:
+            settings: what the camera is like.
+            rng: draws field and noise.
+            glued: where a tag really is when the frame that it marks is at a pose, by tag; default: there.
+            delays: by how much readings of a tag are stamped, and come, later than they should [s], by tag.
+        """
         self._settings, self._rng = settings, rng
+        self._glued, self._delays = dict(glued or {}), dict(delays or {})
         self._field = BiasField(settings.bias, settings.bias_length, rng)
         self._ticker = Ticker(settings.rate)
-        self._underway: deque[tuple[float, TagReading]] = deque()
+        self._underway: list[tuple[float, TagReading]] = []
 
     @property
     def field(self) -> BiasField:
@@ -110,15 +125,16 @@ class TagCamera:
             tags: true pose of each tag by name; read in this order, which fixes the draws.
         """
         for name, pose in tags.items():
-            reading = self._read(name, time, pose)
+            delay = self._delays.get(name, 0.0)
+            reading = self._read(name, time + delay, self._glued[name](pose) if name in self._glued else pose)
             if reading is not None:
-                self._underway.append((time + self._settings.latency, reading))
+                self._underway.append((time + self._settings.latency + delay, reading))
 
     def deliver(self, time: float) -> list[TagReading]:
         """Give the readings whose latency has passed, oldest first."""
-        arrived = []
-        while self._underway and self._underway[0][0] <= time + SLACK:
-            arrived.append(self._underway.popleft()[1])
+        arrived = [reading for due, reading in self._underway if due <= time + SLACK]
+        if arrived:
+            self._underway = [(due, reading) for due, reading in self._underway if due > time + SLACK]
         return arrived
 
     def _read(self, name: str, time: float, pose: Pose) -> TagReading | None:
@@ -143,21 +159,6 @@ def _small_turn(x: float, y: float) -> Array:
     return np.array([scale * x, scale * y, 0.0, math.cos(angle / 2)])
 
 
-def multiply(first: Array, second: Array) -> Array:
-    """Give the quaternion (4,) x y z w of `second` followed by `first`, both about fixed axes."""
-    x1, y1, z1, w1 = first
-    x2, y2, z2, w2 = second
-    product = np.array(
-        [
-            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
-            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
-            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
-            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
-        ]
-    )
-    return product / np.linalg.norm(product)
-
-
 @dataclass(frozen=True)
 class WristReading:
     """What a wrist sensor shows.
@@ -180,9 +181,27 @@ class WristSensor:
     alone is not what a sensor at 100 Hz shows.
     """
 
-    def __init__(self, settings: WristSettings, rng: Generator) -> None:
-        """Set up with an offset drawn from `rng`, which is kept for the noise."""
+    def __init__(
+        self,
+        settings: WristSettings,
+        rng: Generator,
+        *,
+        frame: Array | None = None,
+        drift: Callable[[float], Array] | None = None,
+        delay: float = 0.0,
+    ) -> None:
+        """Set up with an offset drawn from `rng`, which is kept for the noise.
+
+        Args:
+            settings: what the sensor is like.
+            rng: draws offset and noise.
+            frame: (6, 6) from the true wrench to what a sensor mounted askew feels; default: the same.
+            drift: offset (6,) [N, N m] beyond that of the run, at a time [s].
+            delay: by how much readings are stamped, and come, later than they should [s].
+        """
         self._settings, self._rng = settings, rng
+        self._frame, self._drift, self._delay = frame, drift, delay
+        self._underway: deque[WristReading] = deque()
         bounds = np.array([settings.force_bias] * 3 + [settings.torque_bias] * 3)
         self._bias = rng.uniform(-bounds, bounds)
         self._noise = np.array([*settings.force_noise, *settings.torque_noise])
@@ -206,11 +225,19 @@ class WristSensor:
         """
         self._sum += np.concatenate([force, torque])
         self._count += 1
-        if not self._ticker.due(time):
-            return None
+        if self._ticker.due(time):
+            self._underway.append(self._read(time))
+        return self._underway.popleft() if self._underway and self._underway[0].stamp <= time + SLACK else None
+
+    def _read(self, time: float) -> WristReading:
+        """Show the mean since the last reading."""
         mean = self._sum / self._count
         self._sum, self._count = np.zeros(6), 0
+        if self._frame is not None:
+            mean = self._frame @ mean
+        if self._drift is not None:
+            mean = mean + self._drift(time)
         shown = np.clip(mean + self._bias + self._noise * self._rng.normal(size=6), -self._range, self._range)
         steps = np.where(self._resolution > 0, self._resolution, 1.0)
         shown = np.where(self._resolution > 0, np.round(shown / steps) * steps, shown)
-        return WristReading(time, shown[:3], shown[3:])
+        return WristReading(time + self._delay, shown[:3], shown[3:])

@@ -26,6 +26,7 @@ Model = TypeVar("Model", bound=Settings)
 MOST = 1e4  # metres, kilograms, newtons: nothing in a room has more of them, and Bullet does not survive it
 Positive = Annotated[float, Field(gt=0, le=MOST)]
 NonNegative = Annotated[float, Field(ge=0, le=MOST)]
+Stiffness = Annotated[float, Field(ge=1, le=1e5)]  # N/m; beyond that springs between bodies and room shake
 Fraction = Annotated[float, Field(ge=0, lt=1)]
 Coordinate = Annotated[float, Field(ge=-MOST, le=MOST)]
 Vector2 = tuple[Coordinate, Coordinate]

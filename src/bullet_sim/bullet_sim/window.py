@@ -23,8 +23,8 @@ PERIOD = 0.04
 SHARE = 0.2
 """Share of the wall clock that showing may take; views are rarer where drawing is slow."""
 
-BUILDERS = ("create", "load", "changeVisualShape")
-"""Beginnings of the names of Bullet's functions that make what can be seen."""
+BUILDERS = ("create", "load", "changeVisualShape", "remove")
+"""Beginnings of the names of Bullet's functions that make what can be seen, or take it away."""
 
 
 class Window:

@@ -12,10 +12,13 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from bullet_sim.catalogue import OfficeTable, UtilityCart
-from bullet_sim.client import BulletClient, Pose, Twist, yaw_quaternion
+from bullet_sim.catalogue import OfficeTable, PlainTable, UtilityCart
+from bullet_sim.clamp import GripperSpec
+from bullet_sim.client import FLOOR, GRAVITY, BulletClient, Pose, Twist, yaw_quaternion
+from bullet_sim.concealed.build import effects_of, fittings_of, let_down_glides
 from bullet_sim.errors import SimError, nearest
 from bullet_sim.furniture import Furniture
+from bullet_sim.plain import build_plain
 from bullet_sim.prisms import FIXTURE_FRICTION, build_prism
 from bullet_sim.quiet import bullet
 from bullet_sim.scene import Room, Scene
@@ -23,7 +26,6 @@ from bullet_sim.wheeled import build_on_casters
 
 Array = NDArray[np.float64]
 
-FLOOR = "floor"
 WALL_THICKNESS = 0.10
 """Of the walls [m]; they stand outside the room's outline."""
 
@@ -57,6 +59,7 @@ class World:
         client: the Bullet client.
         scene: what was built.
         furniture: the bodies by name.
+        effects: what is concealed and acts while the world steps.
     """
 
     def __init__(self, client: BulletClient, scene: Scene, rng: Generator) -> None:
@@ -72,11 +75,20 @@ class World:
         """
         self.client, self.scene = client, scene
         _build_floor(client, scene.room)
+        concealed = scene.concealed
+        self._fitted = {name: fittings_of(name, body, concealed) for name, body in scene.bodies.items()}
         self.furniture: dict[str, Furniture] = {name: self._build(name, rng) for name in scene.bodies}
+        for name, body in self.furniture.items():
+            let_down_glides(client, body, self._fitted[name])
+        self.effects = effects_of(client, self.furniture, self._fitted, concealed)
 
     def _build(self, name: str, rng: Generator) -> Furniture:
         settings, concealed = self.scene.bodies[name], self.scene.concealed
         mass = concealed.mass.get(name)
+        fittings = [fitting for fitted in self._fitted[name].values() for fitting in fitted]
+        if isinstance(settings, PlainTable):
+            casters = concealed.caster_swivel.get(name)
+            return build_plain(self.client, name, settings, rng, mass=mass, fittings=fittings, casters=casters)
         if not isinstance(settings, OfficeTable | UtilityCart):
             return build_prism(self.client, name, settings, mass=mass)
         lever = concealed.rolling_resistance.get(name)
@@ -84,12 +96,16 @@ class World:
             make = settings.casters.model_copy(update={"rolling_resistance": lever})
             settings = settings.model_copy(update={"casters": make})
         locked, fixed = concealed.locked_casters.get(name, ()), concealed.fixed_wheels.get(name, ())
-        return build_on_casters(self.client, name, settings, rng, mass=mass, locked=locked, fixed=fixed)
+        return build_on_casters(
+            self.client, name, settings, rng, mass=mass, locked=locked, fixed=fixed, fittings=fittings
+        )
 
     def step(self) -> None:
         """Advance by one physics step; forces applied since the last step act during this one."""
         for body in self.furniture.values():
             body.update()
+        for effect in self.effects:
+            effect.update(self.client.time)
         self.client.step()
 
     def find(self, name: str) -> Furniture:
@@ -97,6 +113,17 @@ class World:
         if name not in self.furniture:
             raise SimError(f"body {name!r} is not in the scene; {nearest(name, self.furniture)}")
         return self.furniture[name]
+
+    @property
+    def gravity(self) -> tuple[float, float, float]:
+        """Acceleration of fall (3,) [m/s^2] in `world`: straight down, unless the floor slopes."""
+        slope = self.scene.concealed.floor_slope
+        return (0.0, 0.0, -GRAVITY) if slope is None else slope.gravity
+
+    def plates(self, spec: GripperSpec, body: str) -> GripperSpec:
+        """Give a gripper's plates as they really are on a body."""
+        worn = self.scene.concealed.grasp_compliance.get(body)
+        return spec if worn is None else worn.worn(spec)
 
     def pose(self, name: str) -> Pose:
         """Give the pose of a body's tag frame."""

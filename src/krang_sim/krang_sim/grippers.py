@@ -65,7 +65,8 @@ class Grippers:
         if test.clamp is None:
             return GraspOutcome(False, test.message, test.distance)
         link = self._robot.links[f"{side}_ft"]
-        self._grips[side] = Grip(self._world.client, (NAME, link), SPECS[side], bodies[test.clamp.body], test.clamp)
+        plates = self._world.plates(SPECS[side], test.clamp.body)
+        self._grips[side] = Grip(self._world.client, (NAME, link), plates, bodies[test.clamp.body], test.clamp)
         return GraspOutcome(True, test.message, test.distance)
 
     def release(self, side: str) -> GraspOutcome:

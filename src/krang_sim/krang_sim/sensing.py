@@ -7,7 +7,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from bullet_sim.client import Pose, yaw_quaternion
-from bullet_sim.sensors import TagCamera, Ticker, WristSensor
+from bullet_sim.concealed.sensing import tag_camera, wrist_sensor
+from bullet_sim.sensors import Ticker
 from bullet_sim.world import World
 from krang_sim.frames import RobotFrames
 from krang_sim.known import known_scene
@@ -45,14 +46,13 @@ class Sensing:
     def __init__(self, world: World, robot: Krang, rng: Generator) -> None:
         """Set the sensors up; each draws from a stream of its own, spawned from `rng`."""
         camera_rng, *wrist_rngs = rng.spawn(1 + len(SIDES))
-        settings = world.scene.sensors
         self._world, self._robot = world, robot
         self._known = known_scene(world.scene, 0.0)
         self._bodies = {body.name: body for body in self._known.bodies}
         self.tagged = tuple(body.name for body in self._known.bodies if body.movable)
-        self._camera = TagCamera(settings.tags, camera_rng)
+        self._camera = tag_camera(world.scene, camera_rng)
         self._wrists = {
-            side: WristSensor(settings.wrist_ft, wrist_rng) for side, wrist_rng in zip(SIDES, wrist_rngs, strict=True)
+            side: wrist_sensor(world.scene, side, wrist_rng) for side, wrist_rng in zip(SIDES, wrist_rngs, strict=True)
         }
         self._clock, self._joints = Ticker(CLOCK_RATE), Ticker(JOINT_RATE)
         self._odometer, self._markers = Ticker(ODOMETRY_RATE), Ticker(MARKER_RATE)

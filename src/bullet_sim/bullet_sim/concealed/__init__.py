@@ -1,0 +1,1 @@
+"""What is true and not told: a file an effect, each built from the physics of the thing."""

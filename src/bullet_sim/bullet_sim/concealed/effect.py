@@ -1,0 +1,36 @@
+"""What every concealed effect has: a name, a step, and a truth about whether it acts."""
+
+from __future__ import annotations
+
+
+class Effect:
+    """One thing that is true and not told.
+
+    Attributes:
+        name: of the effect, as in a scene's `concealed` part.
+        unit: of `strength`.
+        target: body, gripper or number of what it is about.
+    """
+
+    name: str
+    unit: str = "N"
+
+    def __init__(self, target: str) -> None:
+        """Take note of what it is about."""
+        self.target = target
+
+    @property
+    def key(self) -> str:
+        """Name and target, as `tether.table_a`."""
+        return f"{self.name}.{self.target}"
+
+    def update(self, time: float) -> None:
+        """Act on the next physics step, which begins at `time` [s]."""
+
+    def strength(self) -> float:
+        """Give how hard it acts now, in `unit`."""
+        raise NotImplementedError
+
+    def acting(self) -> bool:
+        """Tell whether it makes a difference now."""
+        return self.strength() > 0

@@ -1,0 +1,39 @@
+"""Sensors with the faults that a scene conceals."""
+
+from __future__ import annotations
+
+from numpy.random import Generator
+
+from bullet_sim.scene import Scene
+from bullet_sim.sensors import TagCamera, WristSensor
+
+
+def wrist_sensor(scene: Scene, side: str, rng: Generator) -> WristSensor:
+    """Make the force-torque sensor of a gripper.
+
+    Args:
+        scene: says what the sensor is like and what is wrong with it.
+        side: the gripper, "left" or "right".
+        rng: draws its offset and noise.
+    """
+    concealed = scene.concealed
+    frame, drift = concealed.wrench_frame.get(side), concealed.wrench_bias.get(side)
+    late = concealed.time_offset.get(side)
+    return WristSensor(
+        scene.sensors.wrist_ft,
+        rng,
+        frame=None if frame is None else frame.matrix,
+        drift=None if drift is None else drift.at,
+        delay=0.0 if late is None else late.delay,
+    )
+
+
+def tag_camera(scene: Scene, rng: Generator) -> TagCamera:
+    """Make the overhead camera; tags are named after bodies, and `<side>_gripper`."""
+    concealed = scene.concealed
+    return TagCamera(
+        scene.sensors.tags,
+        rng,
+        glued={tag: bias.seen for tag, bias in concealed.pose_bias.items()},
+        delays={stream: late.delay for stream, late in concealed.time_offset.items()},
+    )
