@@ -24,6 +24,7 @@ from typer.exceptions import TyperException
 USER_ERRORS = {
     "pbrl_bag.errors": "BagError",
     "pbrl_model.errors": "ModelError",
+    "pbrl_mismatch.errors": "MismatchError",
     "pbrl_control.errors": "ControlError",
     "bullet_sim.errors": "SimError",
     "pbrl_bringup.errors": "BringupError",
@@ -141,6 +142,39 @@ def fit(
     )
 
 
+@app.command(epilog="Example: ./pbrl diagnose out/demo/bag --baseline wheel+ground --out out/diagnose")
+def diagnose(
+    bag: Bag,
+    mapping: Mapping = None,
+    out: Out = Path("out/diagnose"),
+    baseline: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What is no mismatch: free, caster (one that is locked), wheel, ground, wheel+ground or hinge; as "
+            "often as needed, the best counts. Default: free, caster and wheel."
+        ),
+    ] = None,
+    without: Annotated[
+        list[str] | None, typer.Option(help="An effect that the library does without, as often as needed.")
+    ] = None,
+    seed: Seed = 0,
+    workers: Annotated[
+        int, typer.Option(min=1, max=256, help="Threads; the result does not depend on their number.")
+    ] = 2,
+) -> int:
+    """Say where recording and model part, what physics was left out, and show that the repair predicts better."""
+    return _hand_over(
+        "diagnose",
+        bag=bag,
+        mapping=mapping,
+        out=out,
+        baseline=baseline or [],
+        without=without or [],
+        seed=seed,
+        workers=workers,
+    )
+
+
 @app.command(epilog="Example: ./pbrl simulate locked_caster --push turn_table --seed 2 --out out/push")
 def simulate(
     scene: Annotated[str, typer.Argument(help="Scene file, or a name in config/scenes.")],
@@ -194,7 +228,8 @@ def info(bag: Bag, mapping: Mapping = None) -> int:
 @app.command(epilog="Example: ./pbrl bench wheel --quick")
 def bench(
     name: Annotated[
-        str, typer.Argument(help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose or calibration.")
+        str,
+        typer.Argument(help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose, calibration or concealed."),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,
     seed: Seed = 0,

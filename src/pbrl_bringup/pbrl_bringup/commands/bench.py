@@ -16,6 +16,7 @@ BENCHES = {
     "inference": "posterior and evidence of one wheel, ours against others given the same likelihood",
     "pose": "a wheel's place from pushes of random tables",
     "calibration": "ranks of the truth among posterior draws, over the prior",
+    "concealed": "recordings with one thing concealed: is it noticed, named, and does the repair predict",
 }
 
 

@@ -1,0 +1,65 @@
+"""`./pbrl diagnose BAG`: where a recording and the model part, what was left out, and whether the repair predicts."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from pbrl_bag import read_recording
+from pbrl_bringup.diagnosis.page import write_diagnosis
+from pbrl_bringup.files import result_folder, write_json
+from pbrl_bringup.terminal import output, say, table
+from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis, diagnose
+from pbrl_mismatch.options import DiagnoseOptions
+
+SHOWN = 5
+
+
+def command(
+    bag: Path, mapping: Path | None, out: Path, baseline: list[str], without: list[str], seed: int, workers: int
+) -> int:
+    """Diagnose every object of a recording.
+
+    Raises:
+        BagError: the recording cannot be read or is malformed.
+        ModelError: its motion cannot be learned from.
+        MismatchError: an option does not fit.
+        BringupError: the results cannot be written.
+    """
+    asked: dict[str, Any] = {"baseline": tuple(baseline)} if baseline else {}
+    options = DiagnoseOptions(without=tuple(without), seed=seed, workers=workers, **asked)
+    recording = read_recording(bag, mapping)
+    for note in recording.notes:
+        say(f"pbrl: {note}")
+    with result_folder(out) as folder:
+        with Console(stderr=True).status(f"diagnosing (baseline {', '.join(options.baseline)}, seed {seed})"):
+            found = diagnose(recording, options)
+        write_json(folder / "report.json", found.to_report())
+        write_diagnosis(found, recording, "./pbrl " + shlex.join(sys.argv[1:]), folder / "report.html")
+    print_diagnosis(found)
+    output().print(f"[bold]{out / 'report.html'}[/]")
+    return 0
+
+
+def print_diagnosis(diagnosis: Diagnosis) -> None:
+    """Print the verdict on every object, the likeliest hypotheses, and what must not be read into them."""
+    for name, found in diagnosis.objects.items():
+        for note in found.notes:
+            output().print(note)
+        if found.hypotheses:
+            title = f"{name}: hypotheses, {diagnosis.seconds:.1f} s"
+            output().print(table(title, ("what was left out", "probability"), _rows(found), right=(1,)))
+        errors = found.report["heldout"]["rmse_position_m"]
+        if errors["baseline"] is not None:
+            output().print(
+                f"held out: position off by {1000 * errors['baseline']:.1f} mm before, "
+                f"{1000 * errors['repaired']:.1f} mm after the repair; noise {1000 * errors['noise_floor']:.1f} mm"
+            )
+
+
+def _rows(found: ObjectDiagnosis) -> list[tuple[str, str]]:
+    return [(" + ".join(each.effects) or "nothing", f"{each.probability:.3f}") for each in found.hypotheses[:SHOWN]]

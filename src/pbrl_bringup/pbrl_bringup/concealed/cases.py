@@ -1,0 +1,93 @@
+"""One concealed case: drawn from its seed, simulated, and split into the recording and the sealed truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bullet_sim.errors import SimError
+from bullet_sim.hand_recording import Activity, HandRecording
+from pbrl_bag.types import Recording
+from pbrl_bringup.concealed.draws import DRAWS
+from pbrl_bringup.concealed.recording import to_recording
+from pbrl_bringup.concealed.stage import NAME, Stage, draw_stage, play
+from pbrl_bringup.concealed.truth import Truth
+from pbrl_bringup.errors import BringupError
+
+TRIES = 8
+"""Draws of an effect before a case counts as one that cannot be made."""
+LEAST_SHARE = 0.02
+"""Of the time in which the table moves: an effect that acts for less is drawn again."""
+PLACES = {"floor_patch": "polygon", "hidden_obstacle": "polygon", "second_wheel": "position", "hidden_hinge": "point"}
+"""Settings that say where an effect is."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is to be concealed, and the seed of everything random.
+
+    Attributes:
+        effects: names; empty: a clean recording.
+        seed: of the case.
+    """
+
+    effects: tuple[str, ...]
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Return what to call it."""
+        return f"{'+'.join(self.effects) or 'clean'}-{self.seed}"
+
+
+def make(case: Case) -> tuple[Recording, Truth]:
+    """Simulate a case; the same case makes the same recording.
+
+    Raises:
+        BringupError: no draw of the effects leads to a recording in which they act.
+    """
+    rng = np.random.default_rng([case.seed, *(sum(map(ord, name)) for name in case.effects)])
+    stage = draw_stage(rng)
+    why = ""
+    for _ in range(TRIES):
+        strength = float(rng.random())
+        concealed: dict[str, Any] = {}
+        for effect in case.effects:
+            concealed |= DRAWS[effect](rng, stage, strength)
+        try:
+            made = play(stage, concealed)
+        except (SimError, ValueError) as error:
+            why = str(error).splitlines()[-1]
+            continue
+        truth = _truth(case, stage, concealed, made, strength)
+        if made.status == "done" and all(share >= LEAST_SHARE for share in truth.share.values()):
+            return to_recording(made, stage.with_concealed(concealed)), truth
+        why = made.status if made.status != "done" else f"acting shares {truth.share}"
+    raise BringupError(f"{case.name}: expected one of {TRIES} draws to act and to be done, got {why} in the last")
+
+
+def _truth(case: Case, stage: Stage, concealed: dict[str, Any], made: HandRecording, strength: float) -> Truth:
+    """Put the truth together; when an effect acts comes from the simulator."""
+    moving = np.hypot(*made.bodies[NAME].twist[:, :2].T) + 0.5 * np.abs(made.bodies[NAME].twist[:, 2]) > 0.02
+    when, share, place = {}, {}, {}
+    for effect in case.effects:
+        acts = [activity for activity in made.activities.values() if activity.effect == effect]
+        acting = np.logical_or.reduce([activity.acting for activity in acts]) if acts else np.zeros_like(moving)
+        joined = Activity(effect, NAME, "", made.bodies[NAME].time, acting, np.zeros(len(acting)))
+        when[effect] = [(float(start), float(end)) for start, end in joined.intervals()]
+        share[effect] = float(acting[moving].mean()) if moving.any() else 0.0
+        place[effect] = _place(effect, concealed[effect])
+    return Truth(case.effects, NAME, concealed, when, place, strength, share)
+
+
+def _place(effect: str, settings: Any) -> list[tuple[float, float]]:
+    """Return corners or a point of an effect that has a place, empty else; those of the body are in its own frame."""
+    told = settings[0] if isinstance(settings, list) else settings.get(NAME)
+    if effect == "tether":
+        return [(float(told["anchor"][0]), float(told["anchor"][1]))]
+    if effect not in PLACES or told is None:
+        return []
+    value = np.array(told[PLACES[effect]], dtype=float).reshape(-1, 2)
+    return [(float(x), float(y)) for x, y in value]

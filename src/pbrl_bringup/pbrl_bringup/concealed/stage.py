@@ -1,0 +1,141 @@
+"""The stage of a concealed case: a random table, how it is pushed, and where it goes if nothing is concealed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bullet_sim.errors import SimError
+from bullet_sim.hand_push import push_by_hand
+from bullet_sim.hand_recording import BodyTrack, HandPath, HandPush, HandRecording
+from bullet_sim.scene import Scene
+from pbrl_bringup.errors import BringupError
+
+Array = NDArray[np.float64]
+
+NAME = "table"
+SECONDS, PUSHES = 14.0, 2
+"""Of one push, and how many there are."""
+KNOT = 0.1
+"""Between knots of a path [s]."""
+RAMP = 0.6
+"""In which a push begins and ends [s]."""
+SPEED, SWAY, SPIN = (0.07, 0.13), 0.04, 0.25
+"""Ranges of a push: forth and back, sideways [m/s], turning [rad/s]."""
+WHEEL_SHARE = 0.5
+"""Of the tables that have the one wheel of the baseline class."""
+ROOM = 6.0
+"""Half the extent of the room [m]."""
+TRIES = 12
+"""Pushes that are drawn before a table counts as one that cannot be pushed."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Everything but what is concealed.
+
+    Attributes:
+        scene: settings of the scene, nothing in `concealed` but what belongs to the baseline class.
+        pushes: what the hand does.
+        seed: of the simulation.
+        track: where the table goes if nothing is concealed.
+    """
+
+    scene: dict[str, object]
+    pushes: tuple[HandPush, ...]
+    seed: int
+    track: BodyTrack
+
+    @property
+    def half(self) -> Array:
+        """Half the table's extent (2,) [m]."""
+        return np.array(self.table["size"], dtype=float) / 2.0
+
+    @property
+    def table(self) -> dict[str, object]:
+        """Settings of the table."""
+        bodies: dict[str, dict[str, object]] = self.scene["bodies"]  # type: ignore[assignment]
+        return bodies[NAME]
+
+    @property
+    def mass(self) -> float:
+        """Of the table [kg]."""
+        return float(self.table["nominal_mass"])  # type: ignore[arg-type]
+
+    def moving(self, least: float = 0.03) -> NDArray[np.int64]:
+        """Return samples of the track at which the table moves faster than `least` [m/s]."""
+        speed = np.hypot(*self.track.twist[:, :2].T) + 0.5 * np.abs(self.track.twist[:, 2])
+        return np.flatnonzero(speed > least)
+
+    def with_concealed(self, concealed: dict[str, object]) -> Scene:
+        """Return the scene with more concealed in it."""
+        known: dict[str, object] = dict(self.scene["concealed"])  # type: ignore[call-overload]
+        return Scene.model_validate({**self.scene, "concealed": {**known, **concealed}})
+
+
+def draw_stage(rng: np.random.Generator) -> Stage:
+    """Draw a table and pushes that it survives.
+
+    Args:
+        rng: source of randomness.
+
+    Raises:
+        BringupError: none of the pushes drawn can be done.
+    """
+    scene = _scene(rng)
+    table: dict[str, object] = scene["bodies"][NAME]  # type: ignore[index]
+    half = np.array(table["size"], dtype=float) / 2.0
+    why = ""
+    for number in range(TRIES):
+        pushes = tuple(_push(rng, half, gentle=0.85**number) for _ in range(PUSHES))
+        seed = int(rng.integers(2**31))
+        try:
+            found = push_by_hand(Scene.model_validate(scene), pushes, seed=seed)
+        except SimError as error:  # a table without friction may have rolled on until the hand came back
+            why = str(error)
+            continue
+        if found.status == "done":
+            return Stage(scene, pushes, seed, found.bodies[NAME])
+        why = found.status
+    raise BringupError(f"concealed: expected one of {TRIES} drawn pushes to succeed, got {why!r} in the last")
+
+
+def play(stage: Stage, concealed: dict[str, object]) -> HandRecording:
+    """Push the table of a stage with something concealed."""
+    return push_by_hand(stage.with_concealed(concealed), stage.pushes, seed=stage.seed)
+
+
+def _scene(rng: np.random.Generator) -> dict[str, object]:
+    size = [float(rng.uniform(0.6, 0.9)), float(rng.uniform(1.0, 1.6))]
+    concealed: dict[str, object] = {}
+    mass = float(rng.uniform(16.0, 40.0))
+    if rng.random() < WHEEL_SHARE:
+        place = (rng.uniform(-0.8, 0.8, 2) * np.array(size) / 2.0).tolist()
+        load = float(rng.uniform(0.2, 0.4) * mass * 9.81)
+        concealed["wheel"] = {NAME: {"position": place, "heading": float(rng.uniform(-1.5, 1.5)), "load": load}}
+    outline = [[-ROOM, -ROOM], [ROOM, -ROOM], [ROOM, ROOM], [-ROOM, ROOM]]
+    table = {
+        "kind": "plain_table",
+        "size": size,
+        "nominal_mass": mass,
+        "pose": [0.0, 0.0, float(rng.uniform(-math.pi, math.pi))],
+    }
+    return {"name": "concealed", "room": {"outline": outline}, "bodies": {NAME: table}, "concealed": concealed}
+
+
+def _push(rng: np.random.Generator, half: Array, gentle: float) -> HandPush:
+    """Draw a grasp of an edge and a path: forth and back with changing speed, swaying and turning a little."""
+    side, along = rng.integers(4), rng.uniform(-0.7, 0.7)
+    contact = ((along * half[0], half[1]), (-half[0], along * half[1]), (along * half[0], -half[1]), (half[0], 0.0))
+    time = np.arange(0.0, SECONDS + 1e-9, KNOT)
+    ramp = np.minimum(1.0, np.minimum(time, time[-1] - time) / RAMP)
+    fast, rate = rng.uniform(*SPEED), rng.uniform(0.5, 1.1)
+    speed = fast * (0.55 + 0.9 * np.sin(rate * time + rng.uniform(0, 6)) + 0.2 * np.sin(2.7 * time + rng.uniform(0, 6)))
+    sway = SWAY * np.sin(rng.uniform(0.4, 1.3) * time + rng.uniform(0, 6))
+    spin = SPIN * np.sin(rng.uniform(0.3, 0.9) * time + rng.uniform(0, 6))
+    twist = gentle * np.column_stack([speed, sway, spin]) * ramp[:, None]
+    x, y = contact[int(side)]
+    return HandPush(NAME, (float(x), float(y)), HandPath(time, twist, "hand"))

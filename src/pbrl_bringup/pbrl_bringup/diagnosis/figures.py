@@ -1,0 +1,171 @@
+"""Figures of a diagnosis as SVG text: the residual on the floor and over time, the odds, held-out errors."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pbrl_bag.types import BodyGeometry
+from pbrl_mismatch.data.residual import ResidualWrench
+from pbrl_mismatch.diagnose import ObjectDiagnosis
+
+Array = NDArray[np.float64]
+
+EVERY, OUTLINE_EVERY = 0.3, 2.0
+"""Between arrows, and between outlines, on the floor [s]."""
+SURE = 6.0
+"""Standard deviations at which an arrow's colour is full."""
+SHOWN = 8
+BLUE, ORANGE, GREY = "#0067a8", "#c45500", "#8a9096"
+
+
+def floor(body: BodyGeometry, found: ObjectDiagnosis) -> str:
+    """Draw the way of the object with the left-out force at its centre of mass, and where effects are."""
+    figure, axes = _canvas(7.2, 6.0)
+    residual = found.residual
+    time = residual.time
+    for sample in _spaced(time, OUTLINE_EVERY):
+        corners = _placed(body.footprint, residual.state[sample, :3])
+        axes.fill(*corners.T, facecolor="none", edgecolor=GREY, lw=0.6, alpha=0.6)
+    for episode in np.split(np.arange(len(time)), residual.first[1:]):
+        axes.plot(*residual.state[episode, :2].T, color="black", lw=1.0)
+    _arrows(axes, residual)
+    for entry in found.report["effects"]:
+        _where(axes, entry)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    return _svg(figure)
+
+
+def _arrows(axes: Axes, residual: ResidualWrench) -> None:
+    """Draw forces, the surer the stronger in colour, with a key of a round number of newtons."""
+    at = _spaced(residual.time, EVERY)
+    force, sure = residual.world[at, :2], residual.significance[at]
+    typical = float(np.quantile(np.hypot(*force.T), 0.95)) or 1.0
+    span = float(np.ptp(residual.state[:, :2], axis=0).max()) + 0.5
+    arrows = axes.quiver(
+        *residual.state[at, :2].T,
+        *force.T,
+        sure,
+        cmap="autumn_r",
+        norm=Normalize(0.0, SURE),
+        angles="xy",
+        scale_units="xy",
+        scale=typical / (0.18 * span),
+        width=0.004,
+        zorder=3,
+    )
+    round_one = float(f"{typical:.1g}")
+    axes.quiverkey(arrows, 0.12, 1.03, round_one, f"{round_one:g} N left out", labelpos="E")
+    bar = axes.figure.colorbar(ScalarMappable(Normalize(0.0, SURE), "autumn_r"), ax=axes, shrink=0.6)
+    bar.set_label("standard deviations from nothing")
+
+
+def _where(axes: Axes, entry: Mapping[str, Any]) -> None:
+    """Mark where an effect is, if it has a place in the room."""
+    where = entry.get("where")
+    if not where or where.get("frame") != "world" or not where.get("shape"):
+        return
+    shape = np.array(where["shape"], dtype=float).reshape(-1, 2)
+    if len(shape) > 2:
+        axes.fill(*shape.T, facecolor=BLUE, alpha=0.15, edgecolor=BLUE, lw=1.5)
+    else:
+        axes.plot(*shape.T, "P", color=BLUE, ms=10)
+    axes.annotate(entry["effect"], shape.mean(axis=0), color=BLUE, fontsize=9, ha="center")
+
+
+def over_time(found: ObjectDiagnosis) -> str:
+    """Draw the left-out wrench over time with two standard deviations, and when effects begin and end."""
+    residual = found.residual
+    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
+    rows = figure.subplots(3, 1, sharex=True)
+    time = residual.time - residual.time[0]
+    spread = 2.0 * np.sqrt(np.einsum("tii->ti", residual.covariance))
+    names = ("force to the right [N]", "force away [N]", "turning moment [N m]")
+    for k, (axes, name) in enumerate(zip(rows, names, strict=True)):
+        axes.spines[["top", "right"]].set_visible(False)
+        for part in np.split(np.arange(len(time)), residual.first[1:]):
+            low, high = residual.world[part, k] - spread[part, k], residual.world[part, k] + spread[part, k]
+            axes.fill_between(time[part], low, high, color=ORANGE, alpha=0.25, lw=0)
+            axes.plot(time[part], residual.world[part, k], color=ORANGE, lw=1.2)
+        axes.axhline(0.0, color="black", lw=0.6)
+        axes.set_ylabel(name, fontsize=8)
+        for entry in found.report["effects"]:
+            for start, end in entry["when"] or []:
+                axes.axvspan(start - residual.time[0], end - residual.time[0], color=BLUE, alpha=0.12, lw=0)
+    rows[-1].set_xlabel("seconds since the first grasp; shaded blue: when what is named acts")
+    return _svg(figure)
+
+
+def odds(found: ObjectDiagnosis) -> str:
+    """Draw the probabilities of the likeliest hypotheses."""
+    shown = found.hypotheses[:SHOWN][::-1]
+    figure, axes = _canvas(7.2, 0.9 + 0.34 * max(len(shown), 1))
+    names = [" + ".join(each.effects) or "nothing was left out" for each in shown]
+    best = max((each.log_weight for each in shown), default=0.0)
+    axes.barh(names, [each.probability for each in shown], color=BLUE)
+    for row, each in enumerate(shown):
+        behind = "" if each.log_weight == best else f"  behind by {best - each.log_weight:.0f} nats"
+        axes.text(each.probability, row, f" {each.probability:.3f}{behind}", va="center", fontsize=8)
+    axes.set_xlim(0.0, 1.35)
+    axes.set_xlabel("probability among what was tried")
+    return _svg(figure)
+
+
+def held_out(found: ObjectDiagnosis) -> str:
+    """Draw errors of the baseline and of the repair on what was held out, beside the noise."""
+    figure = Figure(figsize=(7.2, 2.2), layout="constrained")
+    columns = figure.subplots(1, 2)
+    kinds = (("rmse_position_m", "position [mm]", 1000.0), ("rmse_yaw_rad", "heading [degrees]", 180.0 / math.pi))
+    for axes, (name, label, factor) in zip(columns, kinds, strict=True):
+        axes.spines[["top", "right"]].set_visible(False)
+        told = found.report["heldout"][name]
+        values = [told["baseline"], told["repaired"], told["noise_floor"]]
+        known = [math.nan if value is None else factor * value for value in values]
+        axes.barh(["noise", "repaired", "before"], known[::-1], color=[GREY, BLUE, ORANGE])
+        for row, value in enumerate(known[::-1]):
+            if math.isfinite(value):
+                axes.text(value, row, f" {value:.2g}", va="center", fontsize=8)
+        axes.set_xlabel(f"held-out error, {label}")
+        axes.margins(x=0.15)
+    return _svg(figure)
+
+
+def _canvas(width: float, height: float) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = figure.subplots()
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def _svg(figure: Figure) -> str:
+    """Return a figure as an SVG element; the same figure gives the same text."""
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]
+
+
+def _spaced(time: Array, every: float) -> Sequence[int]:
+    """Return samples about `every` [s] apart."""
+    chosen, last = [], -math.inf
+    for sample, moment in enumerate(time.tolist()):
+        if abs(moment - last) >= every:
+            chosen.append(sample)
+            last = moment
+    return chosen
+
+
+def _placed(outline: Array, pose: Array) -> Array:
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return pose[:2] + outline @ np.array([[c, s], [-s, c]])

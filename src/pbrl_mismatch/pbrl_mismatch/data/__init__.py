@@ -1,0 +1,1 @@
+"""What was recorded, laid out for the kernels: tracks, windows, residual wrenches."""

@@ -1,0 +1,172 @@
+"""The wrench that would reconcile a model with what was seen, over time, with its covariance.
+
+An unknown-input smoother: the body's state and a left-out wrench d are estimated together from recorded poses, never
+by second differences. d is an Ornstein-Uhlenbeck process of a size that makes the poses most likely.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.data.track import Track
+from pbrl_mismatch.errors import MismatchError
+from pbrl_mismatch.kernels.columns import WIDTH
+from pbrl_mismatch.kernels.smoother_kernel import SIZE, pushes_along, smooth_episode
+from pbrl_model.sensing.windows import LEAST_NOISE, WIDENING
+
+Array = NDArray[np.float64]
+
+MEMORY = 0.4
+"""Time in which a left-out wrench forgets itself [s]: a contact's, a border's; steady ones are no worse for it."""
+SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+"""Sizes of the left-out force that are tried [N]."""
+
+
+@dataclass(frozen=True)
+class ResidualWrench:
+    """What a model leaves out, in T steps of a track.
+
+    Attributes:
+        time: (T,) [s].
+        state: (T, 6) smoothed states of the model's centre of mass.
+        world: (T, 3) left-out wrench at the centre of mass in world axes [N, N, N m].
+        covariance: (T, 3, 3) of `world`.
+        size: of the left-out force before anything was seen [N].
+        log_likelihood: of the poses [nat].
+        first: (E,) first row of each episode.
+    """
+
+    time: Array
+    state: Array
+    world: Array
+    covariance: Array
+    size: float
+    log_likelihood: float
+    first: NDArray[np.int64]
+
+    @property
+    def body(self) -> Array:
+        """Return (T, 3) the wrench in the body's axes."""
+        return np.einsum("tij,tj->ti", self._turns(), self.world)
+
+    @property
+    def body_covariance(self) -> Array:
+        """Return (T, 3, 3) of `body`."""
+        turns = self._turns()
+        return turns @ self.covariance @ np.swapaxes(turns, -1, -2)
+
+    def _turns(self) -> Array:
+        c, s = np.cos(self.state[:, 2]), np.sin(self.state[:, 2])
+        zero, one = np.zeros_like(c), np.ones_like(c)
+        rows = (np.stack([c, s, zero], -1), np.stack([-s, c, zero], -1), np.stack([zero, zero, one], -1))
+        return np.stack(rows, 1)
+
+    @property
+    def significance(self) -> Array:
+        """Return (T,) how many standard deviations the wrench is from nothing, as a root of chi-square over three."""
+        squares = np.einsum("ti,tij,tj->t", self.world, np.linalg.inv(self.covariance), self.world)
+        return np.sqrt(np.maximum(squares, 0.0) / 3.0)
+
+
+def residual_wrench(
+    track: Track, row: Array, *, size: float | None = None, memory: float = MEMORY, stride: int = 1
+) -> ResidualWrench:
+    """Estimate what a model leaves out.
+
+    Args:
+        track: what was recorded.
+        row: (WIDTH,) parameter row of the model.
+        size: of the left-out force [N]; None: the likeliest of `SIZES`.
+        memory: time in which it forgets itself [s].
+        stride: every so many poses are used.
+
+    Raises:
+        MismatchError: the row does not fit, or a size is not above zero.
+    """
+    if row.shape != (WIDTH,):
+        raise MismatchError(f"residual: expected a row of {WIDTH} columns, got shape {row.shape}")
+    for what, value in (("size", 1.0 if size is None else size), ("memory", memory)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise MismatchError(f"residual: expected a {what} above zero, got {value}")
+    if size is None:
+        likelihoods = [_smooth(track, row, each, memory, stride, back=False)[2] for each in SIZES]
+        size = SIZES[int(np.argmax(likelihoods))]
+    mean, spread, value = _smooth(track, row, size, memory, stride, back=True)
+    return ResidualWrench(
+        track.clock, mean[:, :6], mean[:, 6:], spread[:, 6:, 6:], size, value, np.asarray(track.begin)
+    )
+
+
+def _smooth(
+    track: Track, row: Array, size: float, memory: float, stride: int, *, back: bool
+) -> tuple[Array, Array, float]:
+    count = len(track.clock)
+    mean, spread = np.empty((count, SIZE)), np.empty((count, SIZE, SIZE))
+    sizes = size * np.array([1.0, 1.0, track.gyration])
+    total = 0.0
+    for episode, motion in enumerate(track.motions):
+        begin, last = int(track.begin[episode]), int(track.last[episode])
+        noise = np.where(np.isfinite(motion.noise), np.maximum(motion.noise, LEAST_NOISE), 1.0)
+        place = np.maximum((motion.pose_time - motion.time[0]) / motion.dt, 0.0)
+        total += smooth_episode(
+            row,
+            motion.state[0].copy(),
+            WIDENING * motion.covariance[0] + 1e-10 * np.eye(6),
+            sizes,
+            memory,
+            track.felt,
+            track.mount,
+            track.seen,
+            track.clock,
+            np.array([begin, last + 1 - begin, begin, last]),
+            track.pivot[episode],
+            track.body,
+            track.outline,
+            track.feet,
+            np.ascontiguousarray(place[::stride]),
+            np.ascontiguousarray(motion.pose[::stride]),
+            noise**2,
+            mean[begin : last + 1],
+            spread[begin : last + 1],
+            back,
+        )
+    return mean, spread, total
+
+
+def accelerations(track: Track, rows: Array, path: Array, stride: int) -> Array:
+    """Return how each model would accelerate the body along a given path.
+
+    Args:
+        track: what was recorded.
+        rows: (P, WIDTH).
+        path: (T, 6) states of the centre of mass.
+        stride: every so many steps.
+
+    Returns:
+        (P, n, 3) [m/s^2, m/s^2, rad/s^2], episode after episode.
+    """
+    parts = []
+    for episode in range(len(track.motions)):
+        begin, last = int(track.begin[episode]), int(track.last[episode])
+        out = np.empty((len(rows), -(-(last + 1 - begin) // stride), 3))
+        pushes_along(
+            np.ascontiguousarray(rows),
+            np.ascontiguousarray(path[begin : last + 1]),
+            track.felt,
+            track.mount,
+            track.seen,
+            track.clock,
+            np.array([begin, last + 1 - begin, begin, last]),
+            track.pivot[episode],
+            track.body,
+            track.outline,
+            track.feet,
+            stride,
+            out,
+        )
+        parts.append(out)
+    return np.concatenate(parts, axis=1)

@@ -1,0 +1,176 @@
+"""The episodes of one object laid end to end, with wrenches taken back to the sensors that felt them.
+
+`pbrl_model.sensing` gives the wrench at the centre of mass in world axes. A fault of a sensor acts before that: its
+axes turn with the gripper, and its force makes a moment by the lever from the sensor to the centre of mass. Here that
+last step is undone, so that the kernel can do it again under every hypothesis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_bag.types import BodyGeometry, Recording
+from pbrl_mismatch.errors import MismatchError
+from pbrl_model.geometry import MassProperties, bounding_box, check_polygon
+from pbrl_model.sensing.clock import smooth_gripper
+from pbrl_model.sensing.motion import MARGIN, Motion
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+FEET_SHARE = 0.85
+"""Where no casters are told, a body stands on the corners of its bounding box, shrunk by this."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """What was felt and seen of one object, in T steps.
+
+    Attributes:
+        object: its name.
+        motions: the episodes.
+        felt: (T, 3) planar wrench in the sensor's axes, at the sensor [N, N, N m].
+        mount: (T, 4) cosine and sine of the sensor's turn; its place from the nominal centre of mass [m], world axes.
+        seen: (T, 6) smoothed states of the nominal centre of mass.
+        clock: (T,) [s].
+        begin: (E,) first step of each episode.
+        last: (E,) last step of each episode.
+        pivot: (E, 3) smoothed pose of the body's frame when each episode began.
+        body: (4,) nominal inertia over mass [m^2], centre of mass (x, y) [m], dt [s].
+        outline: (k, 2) footprint.
+        feet: (F, 2) points that carry the load.
+        nominal_mass: [kg], NaN where it was not told.
+    """
+
+    object: str
+    motions: tuple[Motion, ...]
+    felt: Array
+    mount: Array
+    seen: Array
+    clock: Array
+    begin: Index
+    last: Index
+    pivot: Array
+    body: Array
+    outline: Array
+    feet: Array
+    nominal_mass: float
+
+    @property
+    def dt(self) -> float:
+        """Return the step [s]."""
+        return float(self.body[3])
+
+    @property
+    def seconds(self) -> float:
+        """Return how long the object was held [s]."""
+        return len(self.clock) * self.dt
+
+    @property
+    def oriented(self) -> bool:
+        """Tell whether the orientation was observed."""
+        return self.motions[0].oriented
+
+    @property
+    def gyration(self) -> float:
+        """Return the radius of gyration [m], which turns a force scale into a torque scale."""
+        return float(np.sqrt(self.body[0]))
+
+
+def lay_track(
+    recording: Recording, motions: Sequence[Motion], geometry: BodyGeometry, properties: MassProperties
+) -> Track:
+    """Lay episodes end to end.
+
+    Args:
+        recording: that the motions come from.
+        motions: episodes of one object on one grid step.
+        geometry: of the object.
+        properties: its nominal centre of mass and inertia.
+
+    Raises:
+        MismatchError: there is no episode, or they differ in their grid step.
+    """
+    if not motions:
+        raise MismatchError("track: expected at least one episode to diagnose, got none; record a push")
+    dt = motions[0].dt
+    if any(motion.dt != dt for motion in motions):
+        raise MismatchError(f"track: expected episodes on one grid step, got {sorted({m.dt for m in motions})} s")
+    parts = [_sensed(recording, motion, properties.com) for motion in motions]
+    lengths = np.array([len(motion.wrench) for motion in motions])
+    begin = np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int64)
+    seen = np.concatenate([motion.state[:-1] for motion in motions])
+    return Track(
+        object=motions[0].object,
+        motions=tuple(motions),
+        felt=np.concatenate([felt for felt, _ in parts]),
+        mount=np.concatenate([mount for _, mount in parts]),
+        seen=seen,
+        clock=np.concatenate([motion.time[:-1] for motion in motions]),
+        begin=begin,
+        last=begin + lengths - 1,
+        pivot=np.stack([_origin(seen[b], properties.com) for b in begin]),
+        body=np.array([properties.inertia_per_mass, *properties.com, dt]),
+        outline=np.ascontiguousarray(check_polygon(geometry.footprint)),
+        feet=_feet(geometry),
+        nominal_mass=geometry.nominal_mass,
+    )
+
+
+def _feet(geometry: BodyGeometry) -> Array:
+    """Return the points that carry the load: casters where they are told, else near the corners of the outline."""
+    if len(geometry.casters) >= 3:
+        return np.ascontiguousarray(geometry.casters, dtype=float)
+    lower, upper = bounding_box(geometry.footprint)
+    middle, half = 0.5 * (lower + upper), 0.5 * FEET_SHARE * (upper - lower)
+    return middle + half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+
+
+def _origin(state: Array, com: Array) -> Array:
+    """Return the pose of the body's frame (3,) of a state of the centre of mass."""
+    c, s = np.cos(state[2]), np.sin(state[2])
+    return np.array([state[0] - c * com[0] + s * com[1], state[1] - s * com[0] - c * com[1], state[2]])
+
+
+def _sensed(recording: Recording, motion: Motion, com: Array) -> tuple[Array, Array]:
+    """Return the wrench in the sensor's axes (T, 3) and how the sensor was mounted (T, 4).
+
+    With two grippers there is one sensor in this model, half-way between the two: what acts on the body is the same,
+    and a fault is then one that both share.
+    """
+    middle = 0.5 * (motion.time[1:] + motion.time[:-1])
+    centre = 0.5 * (motion.state[1:] + motion.state[:-1])
+    turns, places = [], []
+    for gripper in motion.grippers:
+        turn, place = _mounted(recording, motion, gripper, middle, centre, com)
+        turns.append(turn)
+        places.append(place)
+    turn, arm = np.mean(turns, axis=0), np.mean(places, axis=0) - centre[:, :2]
+    c, s = np.cos(turn), np.sin(turn)
+    fx, fy = motion.wrench[:, 0], motion.wrench[:, 1]
+    tau = motion.wrench[:, 2] - (arm[:, 0] * fy - arm[:, 1] * fx)
+    return np.column_stack([c * fx + s * fy, -s * fx + c * fy, tau]), np.column_stack([c, s, arm])
+
+
+def _mounted(
+    recording: Recording, motion: Motion, gripper: str, middle: Array, centre: Array, com: Array
+) -> tuple[Array, Array]:
+    """Return turn (T,) [rad] and place (T, 2) [m] of one gripper's sensor; turned as the body is at the start."""
+    stream, pose = recording.wrenches[gripper], recording.gripper_poses.get(gripper)
+    if pose is not None and stream.frame != "world":
+        keep = (pose.time >= motion.time[0] - MARGIN) & (pose.time <= motion.time[-1] + MARGIN)
+        cut = type(pose)(pose.time[keep], pose.position[keep], pose.quaternion[keep])
+        rotation, position = smooth_gripper(cut, middle)
+        relative = rotation @ rotation[0].T
+        yaw = np.unwrap(np.arctan2(relative[:, 1, 0] - relative[:, 0, 1], relative[:, 0, 0] + relative[:, 1, 1]))
+        return yaw + centre[0, 2], position[:, :2]
+    c, s = np.cos(centre[:, 2]), np.sin(centre[:, 2])
+    held = [g for g in recording.grasps if g.gripper == gripper and g.object == motion.object]
+    contact = min(held, key=lambda g: abs(g.start - motion.time[0])).contact - com
+    place = centre[:, :2] + np.stack([c * contact[0] - s * contact[1], s * contact[0] + c * contact[1]], -1)
+    world_axes = stream.frame == "world"
+    return np.zeros(len(middle)) if world_axes else centre[:, 2], place

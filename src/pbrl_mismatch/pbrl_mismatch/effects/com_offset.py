@@ -1,0 +1,38 @@
+"""Centre of mass off the centroid."""
+
+from __future__ import annotations
+
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain
+
+
+def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    """Return what is believed of its parameters."""
+    return (
+        plain("com_x", 0.0, 0.25 * float(scene.half[0])),
+        plain("com_y", 0.0, 0.25 * float(scene.half[1])),
+    )
+
+
+def where(values: Values, scene: Scene) -> Where | None:
+    """Return the place that it has."""
+    return disc("body", float(scene.centroid[0]) + values["com_x"], float(scene.centroid[1]) + values["com_y"], 0.05)
+
+
+EFFECT = Effect(
+    name="com_offset",
+    summary="The centre of mass is not at the centroid, and the inertia with it.",
+    equation="com = centroid + d; moment of inertia about it free",
+    shows=(
+        "Fast reversals and turns. For a free body it is a tag glued on with an offset, unless mass or grasp "
+        "are known well."
+    ),
+    parameters=parameters,
+    variants=(
+        (
+            "com_x",
+            "com_y",
+        ),
+    ),
+    where=where,
+    direction="body",
+)

@@ -1,0 +1,158 @@
+"""What an effect is: its law in words, the columns it switches on, what is believed of them, where it would show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.errors import MismatchError
+from pbrl_mismatch.kernels.columns import COLUMN, UNIT
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+Site = Literal["body", "floor", "world", "time", "sensor"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One column that is learned, with a Gaussian prior in its coordinate.
+
+    Attributes:
+        column: its name in `kernels.columns`.
+        centre: most likely value [the column's unit].
+        spread: standard deviation [the column's unit], or of the logarithm where `positive`.
+        positive: the coordinate is the logarithm.
+    """
+
+    column: str
+    centre: float
+    spread: float
+    positive: bool = False
+
+    def __post_init__(self) -> None:
+        if self.column not in COLUMN:
+            raise MismatchError(f"parameter: expected a column of the kernel, got {self.column!r}")
+        if not (self.spread > 0.0 and math.isfinite(self.centre) and (self.centre > 0.0 or not self.positive)):
+            raise MismatchError(
+                f"{self.column}: expected a finite centre and a spread above zero, got {self.centre} and {self.spread}"
+            )
+
+    @property
+    def unit(self) -> str:
+        """Return its unit."""
+        return UNIT[self.column]
+
+    @property
+    def mean(self) -> float:
+        """Return the prior's mean in the coordinate."""
+        return math.log(self.centre) if self.positive else self.centre
+
+
+def plain(column: str, centre: float, spread: float) -> Parameter:
+    """Return a parameter that may be of either sign."""
+    return Parameter(column, centre, spread)
+
+
+def positive(column: str, centre: float, spread: float) -> Parameter:
+    """Return a parameter that is above zero; `spread` is that of its logarithm."""
+    return Parameter(column, centre, spread, positive=True)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What priors are scaled by.
+
+    Attributes:
+        middle: (2,) of the floor that the body swept [m].
+        reach: (2,) half the sides of the swept floor's bounding box [m].
+        centroid: (2,) of the footprint in the body's frame [m].
+        half: (2,) half the sides of the footprint's bounding box [m].
+        mass: of the body as the baseline has it [kg].
+        force: root mean square of the force felt [N].
+        speed: root mean square speed while it moved [m/s].
+        start: of the recording [s].
+        seconds: until its end [s].
+    """
+
+    middle: Array
+    reach: Array
+    centroid: Array
+    half: Array
+    mass: float
+    force: float
+    speed: float
+    start: float
+    seconds: float
+
+    @property
+    def size(self) -> float:
+        """Return half the diagonal of the footprint [m]."""
+        return float(np.hypot(*self.half))
+
+
+@dataclass(frozen=True)
+class Where:
+    """A place that an effect has: an outline (k, 2) [m] in a frame, "world" or the object's."""
+
+    frame: Site
+    shape: Array
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One thing that may have been left out of a model.
+
+    Attributes:
+        name: part of the contract.
+        summary: one sentence.
+        equation: the law, as text.
+        shows: which motion shows it, and what it is confused with.
+        parameters: what it adds to the parameter row, given the scene.
+        variants: sub-models, each the columns that are free in it; the others of `fixed` or off.
+        fixed: columns that are given a value while the effect is on.
+        where: the place it has, from its parameters, or None.
+        when: the column of the moment at which it comes on, or None.
+        direction: the frame in which its force keeps its direction, or what it follows.
+        angles: columns that live on a circle.
+        linear: columns that the effect's wrench is proportional to, all together.
+        touches: columns x, y and radius of a disc that touches the footprint, where the effect is a contact.
+        remembers: whether more moves than the body, so that its past matters.
+    """
+
+    name: str
+    summary: str
+    equation: str
+    shows: str
+    parameters: Callable[[Scene], tuple[Parameter, ...]]
+    variants: tuple[tuple[str, ...], ...]
+    fixed: Mapping[str, float] | None = None
+    where: Callable[[Values, Scene], Where | None] | None = None
+    when: str | None = None
+    direction: str | None = None
+    angles: tuple[str, ...] = ()
+    linear: tuple[str, ...] = ()
+    touches: tuple[str, str, str] | None = None
+    remembers: bool = False
+
+    def chosen(self, scene: Scene, variant: int) -> tuple[Parameter, ...]:
+        """Return the parameters that are free in one variant."""
+        known = {parameter.column: parameter for parameter in self.parameters(scene)}
+        return tuple(known[column] for column in self.variants[variant])
+
+
+def disc(frame: Site, x: float, y: float, radius: float) -> Where:
+    """Return a disc as an outline of sixteen corners."""
+    angle = np.arange(16) * (2.0 * np.pi / 16)
+    return Where(frame, np.stack([x + radius * np.cos(angle), y + radius * np.sin(angle)], -1))
+
+
+def rectangle(frame: Site, x: float, y: float, half_length: float, half_width: float, theta: float) -> Where:
+    """Return a turned rectangle as an outline."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [half_length, half_width]
+    c, s = np.cos(theta), np.sin(theta)
+    return Where(frame, corners @ np.array([[c, s], [-s, c]]) + [x, y])

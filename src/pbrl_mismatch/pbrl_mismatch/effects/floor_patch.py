@@ -1,0 +1,52 @@
+"""A region of the floor with another friction."""
+
+from __future__ import annotations
+
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, plain, positive, rectangle
+
+
+def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    """Return what is believed of its parameters."""
+    return (
+        positive("patch_mu", 0.1, 1.0),
+        plain("patch_x", float(scene.middle[0]), float(scene.reach[0])),
+        plain("patch_y", float(scene.middle[1]), float(scene.reach[1])),
+        positive("patch_length", 0.6, 0.7),
+        positive("patch_width", 0.6, 0.7),
+        plain("patch_theta", 0.0, 0.8),
+    )
+
+
+def where(values: Values, scene: Scene) -> Where | None:
+    """Return the place that it has."""
+    return rectangle(
+        "floor",
+        values["patch_x"],
+        values["patch_y"],
+        values["patch_length"],
+        values["patch_width"],
+        values["patch_theta"],
+    )
+
+
+EFFECT = Effect(
+    name="floor_patch",
+    summary="A region of the floor, such as a carpet, has friction of its own, with a border.",
+    equation="friction mu_p at each load-carrying point that lies in a rectangle on the floor",
+    shows="The border must be crossed, by some points before others; go back over it from another side.",
+    parameters=parameters,
+    variants=(
+        (
+            "patch_mu",
+            "patch_x",
+            "patch_y",
+            "patch_length",
+            "patch_width",
+            "patch_theta",
+        ),
+    ),
+    where=where,
+    direction="velocity",
+    angles=("patch_theta",),
+    linear=("patch_mu",),
+)

@@ -1,0 +1,33 @@
+"""Sliding friction over the whole footprint."""
+
+from __future__ import annotations
+
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, positive
+
+
+def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    """Return what is believed of its parameters."""
+    return (
+        positive("slide_mu", 0.05, 1.2),
+        positive("slide_extent", 1.0, 0.25),
+    )
+
+
+EFFECT = Effect(
+    name="ground_friction",
+    summary=("The body slides on its feet: dry friction at each of them, so that force and moment are coupled."),
+    equation="F = -sum_i mu (m g / n) v_i / |v_i| at the n points that carry the load, tau from their levers",
+    shows=(
+        "A force against the velocity whose size does not follow the speed; a moment while it turns. "
+        "Breakaway friction and trailing casters look alike unless it starts slowly or reverses."
+    ),
+    parameters=parameters,
+    variants=(
+        (
+            "slide_mu",
+            "slide_extent",
+        ),
+    ),
+    direction="velocity",
+    linear=("slide_mu",),
+)

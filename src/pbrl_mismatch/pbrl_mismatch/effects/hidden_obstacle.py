@@ -1,0 +1,42 @@
+"""A fixed thing nobody told us of."""
+
+from __future__ import annotations
+
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain, positive
+
+
+def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    """Return what is believed of its parameters."""
+    return (
+        positive("obstacle_stiffness", 15000.0, 0.8),
+        plain("obstacle_x", float(scene.middle[0]), float(scene.reach[0])),
+        plain("obstacle_y", float(scene.middle[1]), float(scene.reach[1])),
+        positive("obstacle_radius", 0.1, 0.6),
+        positive("obstacle_friction", 0.3, 0.6),
+    )
+
+
+def where(values: Values, scene: Scene) -> Where | None:
+    """Return the place that it has."""
+    return disc("floor", values["obstacle_x"], values["obstacle_y"], values["obstacle_radius"])
+
+
+EFFECT = Effect(
+    name="hidden_obstacle",
+    summary="A fixed thing that is not in the scene stops the body where they touch.",
+    equation="F = -k depth n of a disc in the footprint, with friction at the contact",
+    shows="Go back to the place: what is fixed stops you there again, what is movable is gone.",
+    parameters=parameters,
+    variants=(
+        (
+            "obstacle_stiffness",
+            "obstacle_x",
+            "obstacle_y",
+            "obstacle_radius",
+            "obstacle_friction",
+        ),
+    ),
+    where=where,
+    direction="contact",
+    touches=("obstacle_x", "obstacle_y", "obstacle_radius"),
+)

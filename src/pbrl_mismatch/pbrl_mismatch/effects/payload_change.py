@@ -1,0 +1,41 @@
+"""The mass changes at some moment."""
+
+from __future__ import annotations
+
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain
+
+
+def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    """Return what is believed of its parameters."""
+    return (
+        plain("payload_mass", 0.0, 0.3 * scene.mass),
+        plain("payload_time", scene.start + 0.5 * scene.seconds, 0.35 * scene.seconds),
+        plain("payload_x", float(scene.centroid[0]), 0.5 * float(scene.half[0])),
+        plain("payload_y", float(scene.centroid[1]), 0.5 * float(scene.half[1])),
+    )
+
+
+def where(values: Values, scene: Scene) -> Where | None:
+    """Return the place that it has."""
+    return disc("body", values["payload_x"], values["payload_y"], 0.1)
+
+
+EFFECT = Effect(
+    name="payload_change",
+    summary="Something is put on or taken off at some moment.",
+    equation="m -> m + M at t_p; M sits at a point of the body, so centre of mass and inertia move too",
+    shows="Push with the same force before and after.",
+    parameters=parameters,
+    variants=(
+        (
+            "payload_mass",
+            "payload_time",
+            "payload_x",
+            "payload_y",
+        ),
+    ),
+    where=where,
+    when="payload_time",
+    direction="acceleration",
+    linear=("payload_mass",),
+)

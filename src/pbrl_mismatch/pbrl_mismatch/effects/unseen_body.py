@@ -1,0 +1,42 @@
+"""A movable thing nobody told us of."""
+
+from __future__ import annotations
+
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain, positive
+
+
+def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    """Return what is believed of its parameters."""
+    return (
+        positive("unseen_force", 0.5 * scene.force, 0.8),
+        plain("unseen_x", float(scene.middle[0]), float(scene.reach[0])),
+        plain("unseen_y", float(scene.middle[1]), float(scene.reach[1])),
+        positive("unseen_radius", 0.15, 0.5),
+    )
+
+
+def where(values: Values, scene: Scene) -> Where | None:
+    """Return the place that it has."""
+    return disc("floor", values["unseen_x"], values["unseen_y"], values["unseen_radius"])
+
+
+EFFECT = Effect(
+    name="unseen_body",
+    summary="A movable thing that is not in the scene is met on the way and pushed along.",
+    equation="contact with a disc that slides when it is pressed with more than F",
+    shows="Go back to where it was met: it is gone.",
+    parameters=parameters,
+    variants=(
+        (
+            "unseen_force",
+            "unseen_x",
+            "unseen_y",
+            "unseen_radius",
+        ),
+    ),
+    where=where,
+    direction="contact",
+    linear=("unseen_force",),
+    remembers=True,
+    touches=("unseen_x", "unseen_y", "unseen_radius"),
+)

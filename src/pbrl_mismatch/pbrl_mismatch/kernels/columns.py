@@ -1,0 +1,120 @@
+"""The one flat parameter row of the effects kernel: which column is what, and what it is worth when it is off.
+
+The first twelve columns are those of `pbrl_model.parameters.KERNEL_COLUMNS`. An effect is off where its strength is
+zero; its other columns then do not matter. `cone` chooses the law of the baseline's wheel: 0 limits its friction along
+each axis alone, as the thesis and `pbrl_model.kernel` do; 1 limits both together by an ellipse, as rubber on a floor
+does. A `mu_y` or `wheel2_mu_y` below zero stands for one that is the same as that along x.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_model.parameters import KERNEL_COLUMNS, UNITS
+
+Array = NDArray[np.float64]
+
+_EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
+    ("inertia_factor", "1", 1.0),
+    ("cone", "1", 0.0),
+    ("delay", "s", 0.0),
+    ("slide_mu", "1", 0.0),
+    ("slide_extent", "1", 1.0),
+    ("breakaway_mu", "1", 0.0),
+    ("breakaway_speed", "m/s", 0.01),
+    ("drag_linear", "N s/m", 0.0),
+    ("drag_turn", "N m s", 0.0),
+    ("patch_mu", "1", 0.0),
+    ("patch_x", "m", 0.0),
+    ("patch_y", "m", 0.0),
+    ("patch_length", "m", 1.0),
+    ("patch_width", "m", 1.0),
+    ("patch_theta", "rad", 0.0),
+    ("slope_x", "rad", 0.0),
+    ("slope_y", "rad", 0.0),
+    ("com_x", "m", 0.0),
+    ("com_y", "m", 0.0),
+    ("payload_mass", "kg", 0.0),
+    ("payload_time", "s", 0.0),
+    ("payload_x", "m", 0.0),
+    ("payload_y", "m", 0.0),
+    ("tether_stiffness", "N/m", 0.0),
+    ("tether_x", "m", 0.0),
+    ("tether_y", "m", 0.0),
+    ("tether_length", "m", 0.0),
+    ("tether_at_x", "m", 0.0),
+    ("tether_at_y", "m", 0.0),
+    ("steady_x", "N", 0.0),
+    ("steady_y", "N", 0.0),
+    ("steady_torque", "N m", 0.0),
+    ("periodic_x", "N", 0.0),
+    ("periodic_y", "N", 0.0),
+    ("periodic_torque", "N m", 0.0),
+    ("periodic_frequency", "Hz", 0.0),
+    ("periodic_phase", "rad", 0.0),
+    ("obstacle_stiffness", "N/m", 0.0),
+    ("obstacle_x", "m", 0.0),
+    ("obstacle_y", "m", 0.0),
+    ("obstacle_radius", "m", 0.1),
+    ("obstacle_friction", "1", 0.0),
+    ("wheel2_x", "m", 0.0),
+    ("wheel2_y", "m", 0.0),
+    ("wheel2_theta", "rad", 0.0),
+    ("wheel2_mu_x", "1", 0.0),
+    ("wheel2_mu_y", "1", 0.0),
+    ("caster_trail", "m", 0.03),
+    ("caster_roll", "1", 0.0),
+    ("caster_scrub", "1", 0.0),
+    ("caster_heading", "rad", 0.0),
+    ("slosh_mass", "kg", 0.0),
+    ("slosh_frequency", "Hz", 1.0),
+    ("slosh_damping", "1", 0.1),
+    ("detent_force", "N", 0.0),
+    ("detent_x", "m", 0.0),
+    ("detent_y", "m", 0.0),
+    ("detent_width", "m", 0.05),
+    ("pivot_stiffness", "N/m", 0.0),
+    ("pivot_x", "m", 0.0),
+    ("pivot_y", "m", 0.0),
+    ("unseen_force", "N", 0.0),
+    ("unseen_x", "m", 0.0),
+    ("unseen_y", "m", 0.0),
+    ("unseen_radius", "m", 0.15),
+    ("bias_x", "N", 0.0),
+    ("bias_y", "N", 0.0),
+    ("bias_torque", "N m", 0.0),
+    ("drift_x", "N/s", 0.0),
+    ("drift_y", "N/s", 0.0),
+    ("drift_torque", "N m/s", 0.0),
+    ("force_scale", "1", 1.0),
+    ("torque_scale", "1", 1.0),
+    ("sensor_turn", "rad", 0.0),
+    ("time_offset", "s", 0.0),
+    ("tag_x", "m", 0.0),
+    ("tag_y", "m", 0.0),
+    ("tag_theta", "rad", 0.0),
+    ("grip_compliance", "m/N", 0.0),
+    ("grip_turn", "rad/(N m)", 0.0),
+)
+
+COLUMNS: tuple[str, ...] = (*KERNEL_COLUMNS, *(name for name, _, _ in _EFFECT_COLUMNS))
+"""Names of the columns of a parameter row, in order."""
+COLUMN: dict[str, int] = {name: k for k, name in enumerate(COLUMNS)}
+"""Where each name stands."""
+UNIT: dict[str, str] = {**UNITS, **{name: unit for name, unit, _ in _EFFECT_COLUMNS}}
+"""Unit of each column."""
+WIDTH = len(COLUMNS)
+"""Length of a parameter row."""
+
+_BASE_OFF = {"mass": 1.0, "hinge_radius": math.nan}
+
+
+def neutral_row() -> Array:
+    """Return a (WIDTH,) row of a kilogram that slides freely: no wheel, no hinge, every effect off."""
+    values = {name: _BASE_OFF.get(name, 0.0) for name in KERNEL_COLUMNS} | {
+        name: off for name, _, off in _EFFECT_COLUMNS
+    }
+    return np.array([values[name] for name in COLUMNS])

@@ -1,0 +1,320 @@
+"""Compiled: what every effect does to a body at one moment, as forces and as resistances.
+
+A law adds to an account `acc` (9,): force and torque (0..2) at the centre of mass in world axes, and the upper
+triangle xx, xy, yy, xt, yt, tt (3..8) of a matrix D of resistances, so that the wrench is acc[:3] - D (vx, vy, omega).
+Resistances are solved for implicitly, which keeps stiff springs and dry friction steady at any step: a spring adds
+its stiffness times dt, dry friction its limit over the sliding speed, taken from the iteration before.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pbrl_mismatch.kernels import places as at
+from pbrl_model.kernel import GRAVITY
+
+Array = NDArray[np.float64]
+
+CREEP = 1e-3
+"""Dry friction is viscous below this sliding speed [m/s]."""
+BORDER = 0.01
+"""A patch's border is so soft [m]: a foot has a width, and a fit needs a slope."""
+SETTLING = 0.02
+"""Time in which a contact's or a cord's oscillation is damped [s]: damping over stiffness."""
+UNSEEN_STIFFNESS = 5000.0
+"""Stiffness of the contact with an unseen body [N/m]."""
+CASTERS, FIRST_CASTER, SLOSH, UNSEEN, STATE = 8, 6, 14, 18, 20
+"""Casters at most; where the headings, the load's swing and the unseen body's place stand in a state; its length."""
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def push(acc: Array, rx: float, ry: float, fx: float, fy: float) -> None:
+    """Add a force (fx, fy) [N] at the lever (rx, ry) [m]."""
+    acc[0] += fx
+    acc[1] += fy
+    acc[2] += rx * fy - ry * fx
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def resist(acc: Array, rx: float, ry: float, nx: float, ny: float, k: float) -> None:
+    """Add a resistance k [N s/m] to the motion of the lever's end along the direction (nx, ny)."""
+    lever = rx * ny - ry * nx
+    acc[3] += k * nx * nx
+    acc[4] += k * nx * ny
+    acc[5] += k * ny * ny
+    acc[6] += k * nx * lever
+    acc[7] += k * ny * lever
+    acc[8] += k * lever * lever
+
+
+@njit(cache=True, error_model="numpy")
+def nearest_edge(outline: Array, bx: float, by: float) -> tuple[float, float, float, float, float]:
+    """Return the signed distance of a point to a counter-clockwise polygon, the nearest point, and the normal there.
+
+    The normal points from the polygon to the outside.
+    """
+    best, px, py, nx, ny, inside = math.inf, 0.0, 0.0, 0.0, 0.0, False
+    corners = outline.shape[0]
+    for i in range(corners):
+        ax, ay = outline[i, 0], outline[i, 1]
+        ex, ey = outline[(i + 1) % corners, 0] - ax, outline[(i + 1) % corners, 1] - ay
+        share = ((bx - ax) * ex + (by - ay) * ey) / (ex * ex + ey * ey)
+        share = min(max(share, 0.0), 1.0)
+        qx, qy = ax + share * ex, ay + share * ey
+        distance = math.sqrt((bx - qx) ** 2 + (by - qy) ** 2)
+        if distance < best:
+            best, px, py = distance, qx, qy
+            length = math.sqrt(ex * ex + ey * ey)
+            nx, ny = ey / length, -ex / length
+        if (ay > by) != (ay + ey > by) and bx < ax + (by - ay) / ey * ex:
+            inside = not inside
+    if not inside and best > 1e-9:
+        nx, ny = (bx - px) / best, (by - py) / best
+    return (-best if inside else best), px, py, nx, ny
+
+
+@njit(cache=True, error_model="numpy")
+def patch_share(p: Array, x: float, y: float) -> float:
+    """Return how much a place on the floor belongs to the patch, 0..1."""
+    c, s = math.cos(p[at.PATCH_THETA]), math.sin(p[at.PATCH_THETA])
+    dx, dy = x - p[at.PATCH_X], y - p[at.PATCH_Y]
+    along = (p[at.PATCH_LENGTH] - abs(c * dx + s * dy)) / BORDER
+    across = (p[at.PATCH_WIDTH] - abs(-s * dx + c * dy)) / BORDER
+    if along < -30.0 or across < -30.0:
+        return 0.0
+    return 1.0 / ((1.0 + math.exp(-along)) * (1.0 + math.exp(-across)))
+
+
+@njit(cache=True, error_model="numpy")
+def contact(
+    p: Array, outline: Array, state: Array, c: float, s: float, com: Array, qx: float, qy: float, radius: float
+) -> tuple[float, float, float, float, float]:
+    """Return depth of a disc at (qx, qy) in the footprint, lever of the contact and its outward normal, world axes."""
+    dx, dy = qx - state[0], qy - state[1]
+    gap, px, py, nx, ny = nearest_edge(outline, c * dx + s * dy + com[0], -s * dx + c * dy + com[1])
+    px, py = px - com[0], py - com[1]
+    return radius - gap, c * px - s * py, s * px + c * py, c * nx - s * ny, s * nx + c * ny
+
+
+@njit(cache=True, error_model="numpy")
+def move_unseen(p: Array, outline: Array, state: Array, c: float, s: float, com: Array) -> None:
+    """Let the unseen body slide away from a footprint that presses it harder than its friction holds."""
+    depth, _, _, nx, ny = contact(p, outline, state, c, s, com, state[UNSEEN], state[UNSEEN + 1], p[at.UNSEEN_RADIUS])
+    slid = depth - p[at.UNSEEN_FORCE] / UNSEEN_STIFFNESS
+    if slid > 0.0:
+        state[UNSEEN] += slid * nx
+        state[UNSEEN + 1] += slid * ny
+
+
+@njit(cache=True, error_model="numpy")
+def swivel(heading: float, vx: float, vy: float, way: float) -> float:
+    """Return a caster's heading after its pivot has gone `way` trails along (vx, vy), exact for a straight way."""
+    turn = math.atan2(vy, vx) - heading
+    turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+    half = min(max(0.5 * turn, -1.5705), 1.5705)  # one that goes straight backwards still has to turn over
+    return heading + turn - 2.0 * math.atan(math.tan(half) * math.exp(-way))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def springs(
+    p: Array,
+    state: Array,
+    c: float,
+    s: float,
+    time: float,
+    mass: float,
+    com: Array,
+    pivot: Array,
+    outline: Array,
+    dt: float,
+    acc: Array,
+) -> None:
+    """Add what depends on place and time: slope, pushes from outside, cords, catches, pivots, contacts, a swing.
+
+    Args:
+        p: (WIDTH,) parameter row.
+        state: (STATE,) of the centre of mass and of what else moves.
+        c: cosine of the heading.
+        s: sine of the heading.
+        time: [s] on the recording's clock.
+        mass: [kg] now.
+        com: (2,) centre of mass in the body's frame [m] now.
+        pivot: (3,) pose of the body's frame when the episode began, which a hidden hinge holds on to.
+        outline: (E, 2) footprint, counter-clockwise.
+        dt: [s].
+        acc: (9,) account.
+    """
+    weight = mass * GRAVITY
+    acc[0] += weight * p[at.SLOPE_X] + p[at.STEADY_X]
+    acc[1] += weight * p[at.SLOPE_Y] + p[at.STEADY_Y]
+    acc[2] += p[at.STEADY_TORQUE]
+    if p[at.PERIODIC_FREQUENCY] > 0.0:
+        wave = math.sin(2.0 * math.pi * p[at.PERIODIC_FREQUENCY] * time + p[at.PERIODIC_PHASE])
+        acc[0] += wave * p[at.PERIODIC_X]
+        acc[1] += wave * p[at.PERIODIC_Y]
+        acc[2] += wave * p[at.PERIODIC_TORQUE]
+    if p[at.TETHER_STIFFNESS] > 0.0:
+        ax, ay = p[at.TETHER_AT_X] - com[0], p[at.TETHER_AT_Y] - com[1]
+        rx, ry = c * ax - s * ay, s * ax + c * ay
+        dx, dy = state[0] + rx - p[at.TETHER_X], state[1] + ry - p[at.TETHER_Y]
+        length = math.sqrt(dx * dx + dy * dy)
+        if length > p[at.TETHER_LENGTH] and length > 1e-9:
+            nx, ny, k = dx / length, dy / length, p[at.TETHER_STIFFNESS]
+            force = -k * (length - p[at.TETHER_LENGTH])
+            push(acc, rx, ry, force * nx, force * ny)
+            resist(acc, rx, ry, nx, ny, k * (dt + SETTLING))
+    if p[at.DETENT_FORCE] != 0.0:
+        rx, ry = -c * com[0] + s * com[1], -s * com[0] - c * com[1]
+        dx, dy = state[0] + rx - p[at.DETENT_X], state[1] + ry - p[at.DETENT_Y]
+        near = (dx * dx + dy * dy) / p[at.DETENT_WIDTH] ** 2
+        k = p[at.DETENT_FORCE] / p[at.DETENT_WIDTH] * math.exp(0.5 - 0.5 * near)
+        push(acc, rx, ry, -k * dx, -k * dy)
+        if k > 0.0 and near < 1.0:
+            resist(acc, rx, ry, 1.0, 0.0, k * dt)
+            resist(acc, rx, ry, 0.0, 1.0, k * dt)
+    if p[at.PIVOT_STIFFNESS] > 0.0:
+        k, c0, s0 = p[at.PIVOT_STIFFNESS], math.cos(pivot[2]), math.sin(pivot[2])
+        dx, dy = p[at.PIVOT_X] - pivot[0], p[at.PIVOT_Y] - pivot[1]
+        ax, ay = c0 * dx + s0 * dy - com[0], -s0 * dx + c0 * dy - com[1]
+        rx, ry = c * ax - s * ay, s * ax + c * ay
+        push(acc, rx, ry, k * (p[at.PIVOT_X] - state[0] - rx), k * (p[at.PIVOT_Y] - state[1] - ry))
+        resist(acc, rx, ry, 1.0, 0.0, k * (dt + SETTLING))
+        resist(acc, rx, ry, 0.0, 1.0, k * (dt + SETTLING))
+    if p[at.OBSTACLE_STIFFNESS] > 0.0:
+        found = contact(p, outline, state, c, s, com, p[at.OBSTACLE_X], p[at.OBSTACLE_Y], p[at.OBSTACLE_RADIUS])
+        depth, rx, ry, nx, ny = found
+        if depth > 0.0:
+            k = p[at.OBSTACLE_STIFFNESS]
+            push(acc, rx, ry, -k * depth * nx, -k * depth * ny)
+            resist(acc, rx, ry, nx, ny, k * (dt + SETTLING))
+            if p[at.OBSTACLE_FRICTION] > 0.0:
+                slip = (state[4] + state[5] * rx) * nx - (state[3] - state[5] * ry) * ny
+                grip = p[at.OBSTACLE_FRICTION] * k * depth / math.sqrt(slip * slip + CREEP * CREEP)
+                resist(acc, rx, ry, -ny, nx, grip)
+    if p[at.UNSEEN_FORCE] > 0.0:
+        found = contact(p, outline, state, c, s, com, state[UNSEEN], state[UNSEEN + 1], p[at.UNSEEN_RADIUS])
+        depth, rx, ry, nx, ny = found
+        if depth > 0.0:
+            force = min(UNSEEN_STIFFNESS * depth, p[at.UNSEEN_FORCE])
+            push(acc, rx, ry, -force * nx, -force * ny)
+            if force < 0.999 * p[at.UNSEEN_FORCE]:
+                resist(acc, rx, ry, nx, ny, UNSEEN_STIFFNESS * (dt + SETTLING))
+    if p[at.SLOSH_MASS] > 0.0:
+        rate = 2.0 * math.pi * p[at.SLOSH_FREQUENCY]
+        k, d = p[at.SLOSH_MASS] * rate * rate, 2.0 * p[at.SLOSH_MASS] * p[at.SLOSH_DAMPING] * rate
+        acc[0] += k * state[SLOSH] + d * state[SLOSH + 2]
+        acc[1] += k * state[SLOSH + 1] + d * state[SLOSH + 3]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def dry(p: Array) -> bool:
+    """Tell whether any dry friction of the effects is on: its limit depends on the velocity it leads to."""
+    floor = p[at.SLIDE_MU] + p[at.BREAKAWAY_MU] + abs(p[at.PATCH_MU]) + p[at.CASTER_ROLL] + p[at.CASTER_SCRUB]
+    return floor + p[at.WHEEL2_MU_X] + max(p[at.WHEEL2_MU_Y], 0.0) > 0.0
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def rubs(p: Array) -> bool:
+    """Tell whether any resistance to motion is on."""
+    return dry(p) or p[at.DRAG_LINEAR] != 0.0 or p[at.DRAG_TURN] != 0.0
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def drag_wheel(
+    c: float,
+    s: float,
+    vx: float,
+    vy: float,
+    omega: float,
+    ax: float,
+    ay: float,
+    wc: float,
+    ws: float,
+    along: float,
+    across: float,
+    acc: Array,
+) -> None:
+    """Add a wheel's dry friction: F = -D^2 u / sqrt(u^T D^2 u) with D = diag(along, across) [N] in the wheel's axes.
+
+    That is friction within an ellipse, against the motion where both limits are the same. `across` below zero: the
+    same as `along`.
+    """
+    across = along if across < 0.0 else across
+    rx, ry = c * ax - s * ay, s * ax + c * ay
+    ex, ey = c * wc - s * ws, s * wc + c * ws
+    ux, uy = vx - omega * ry, vy + omega * rx
+    first, second = along * (ux * ex + uy * ey), across * (uy * ex - ux * ey)
+    rest = CREEP * max(along, across)
+    scale = 1.0 / math.sqrt(first * first + second * second + rest * rest)
+    resist(acc, rx, ry, ex, ey, along * along * scale)
+    resist(acc, rx, ry, -ey, ex, across * across * scale)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def resistances(
+    p: Array,
+    state: Array,
+    c: float,
+    s: float,
+    vx: float,
+    vy: float,
+    omega: float,
+    mass: float,
+    com: Array,
+    feet: Array,
+    axes: Array,
+    acc: Array,
+) -> None:
+    """Add what resists motion: drag, and dry friction at every foot and at the second wheel.
+
+    Args:
+        p: see `springs`, and so are those not named here.
+        state: see `springs`.
+        c: see `springs`.
+        s: see `springs`.
+        vx: velocity of the centre of mass at which the sliding speeds are taken [m/s].
+        vy: as `vx`.
+        omega: [rad/s].
+        mass: see `springs`.
+        com: see `springs`.
+        feet: (F, 2) points in the body's frame that share the load [m].
+        axes: (5,) see `fixed_axes`.
+        acc: (9,) account.
+    """
+    acc[3] += p[at.DRAG_LINEAR]
+    acc[5] += p[at.DRAG_LINEAR]
+    acc[8] += p[at.DRAG_TURN]
+    count = feet.shape[0]
+    load = mass * GRAVITY / count
+    slides = p[at.SLIDE_MU] > 0.0 or p[at.BREAKAWAY_MU] > 0.0
+    rolls = p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0
+    if slides or rolls or p[at.PATCH_MU] != 0.0:
+        for i in range(count):
+            ax, ay = p[at.SLIDE_EXTENT] * feet[i, 0] - com[0], p[at.SLIDE_EXTENT] * feet[i, 1] - com[1]
+            rx, ry = c * ax - s * ay, s * ax + c * ay
+            ux, uy = vx - omega * ry, vy + omega * rx
+            square = ux * ux + uy * uy
+            mu = p[at.SLIDE_MU]
+            if p[at.BREAKAWAY_MU] > 0.0:
+                mu += p[at.BREAKAWAY_MU] * math.exp(-square / p[at.BREAKAWAY_SPEED] ** 2)
+            if p[at.PATCH_MU] != 0.0:
+                mu += p[at.PATCH_MU] * patch_share(p, state[0] + rx, state[1] + ry)
+            k = mu * load / math.sqrt(square + CREEP * CREEP)
+            resist(acc, rx, ry, 1.0, 0.0, k)
+            resist(acc, rx, ry, 0.0, 1.0, k)
+            if rolls and i < CASTERS:
+                ex, ey = math.cos(state[FIRST_CASTER + i]), math.sin(state[FIRST_CASTER + i])
+                along, across = ux * ex + uy * ey, uy * ex - ux * ey
+                roll = p[at.CASTER_ROLL] * load / math.sqrt(along * along + CREEP * CREEP)
+                scrub = p[at.CASTER_SCRUB] * load / math.sqrt(across * across + CREEP * CREEP)
+                resist(acc, rx, ry, ex, ey, roll)
+                resist(acc, rx, ry, -ey, ex, scrub)
+    weight = mass * GRAVITY
+    if p[at.WHEEL2_MU_X] > 0.0 or p[at.WHEEL2_MU_Y] > 0.0:
+        ax, ay = p[at.WHEEL2_X] - com[0], p[at.WHEEL2_Y] - com[1]
+        along, across = weight * p[at.WHEEL2_MU_X], weight * p[at.WHEEL2_MU_Y]
+        drag_wheel(c, s, vx, vy, omega, ax, ay, axes[2], axes[3], along, across, acc)

@@ -1,0 +1,130 @@
+"""Compiled: from what sensors say to what acts: faults of sensors undone, mass and its centre now, start states.
+
+`felt` (T, 3) is the wrench in the sensor's axes (planar), `mount` (T, 4) cosine and sine of the sensor's turn and its
+place from the nominal centre of mass as tags saw it [m], world axes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pbrl_mismatch.kernels import places as at
+from pbrl_model.kernel import cos_sin
+
+Array = NDArray[np.float64]
+
+SWITCHING = 0.1
+"""A load comes on within this time [s]: a fit needs a slope."""
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def load_now(p: Array, time: float, body: Array, com: Array) -> tuple[float, float]:
+    """Return mass [kg] and moment of inertia [kg m^2]; write the centre of mass in the body's frame (2,).
+
+    Args:
+        p: (WIDTH,) parameter row.
+        time: [s].
+        body: (4,) nominal inertia over mass [m^2], nominal centre of mass (x, y) [m], dt [s].
+        com: (2,) written.
+    """
+    mass = p[at.MASS]
+    inertia = mass * body[0] * p[at.INERTIA_FACTOR]
+    com[0], com[1] = body[1] + p[at.COM_X], body[2] + p[at.COM_Y]
+    if p[at.PAYLOAD_MASS] != 0.0:
+        share = min(max((time - p[at.PAYLOAD_TIME]) / SWITCHING + 0.5, 0.0), 1.0)
+        load = max(share * p[at.PAYLOAD_MASS], -0.8 * mass)
+        dx, dy = p[at.PAYLOAD_X] - com[0], p[at.PAYLOAD_Y] - com[1]
+        mass += load
+        inertia += load * (dx * dx + dy * dy) * (1.0 - load / mass)
+        inertia = max(inertia, 0.2 * mass * body[0])
+        com[0] += dx * load / mass
+        com[1] += dy * load / mass
+    return mass, inertia
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def acting(
+    p: Array,
+    felt: Array,
+    mount: Array,
+    seen: Array,
+    t: int,
+    first: int,
+    last: int,
+    time: float,
+    body: Array,
+    com: Array,
+    out: Array,
+) -> None:
+    """Write the wrench at the centre of mass in world axes (3,) of step `t` into `out`.
+
+    Args:
+        p: (WIDTH,) parameter row.
+        felt: (T, 3).
+        mount: (T, 4).
+        seen: (T, 6) smoothed states of the nominal centre of mass.
+        t: step.
+        first: first step of the episode.
+        last: last step of the episode.
+        time: of the step [s].
+        body: see `load_now`.
+        com: (2,) centre of mass in the body's frame [m].
+        out: (3,) written.
+    """
+    late = (p[at.DELAY] + p[at.TIME_OFFSET]) / body[3]
+    before, share = t, 0.0
+    if late != 0.0:
+        place = min(max(t - late, first), last)
+        before = min(math.floor(place), last - 1) if last > first else first
+        share = place - before if last > first else 0.0
+    after = min(before + 1, last)
+    fx = felt[before, 0] + share * (felt[after, 0] - felt[before, 0]) - p[at.BIAS_X] - p[at.DRIFT_X] * time
+    fy = felt[before, 1] + share * (felt[after, 1] - felt[before, 1]) - p[at.BIAS_Y] - p[at.DRIFT_Y] * time
+    tau = felt[before, 2] + share * (felt[after, 2] - felt[before, 2]) - p[at.BIAS_TORQUE] - p[at.DRIFT_TORQUE] * time
+    fx, fy, tau = fx / p[at.FORCE_SCALE], fy / p[at.FORCE_SCALE], tau / p[at.TORQUE_SCALE]
+    pc, ps = mount[t, 0], mount[t, 1]
+    if p[at.SENSOR_TURN] != 0.0:
+        tc, ts = math.cos(p[at.SENSOR_TURN]), math.sin(p[at.SENSOR_TURN])
+        pc, ps = pc * tc + ps * ts, ps * tc - pc * ts
+    out[0], out[1] = pc * fx - ps * fy, ps * fx + pc * fy
+    ax, ay = mount[t, 2], mount[t, 3]
+    moved = p[at.TAG_X] != 0.0 or p[at.TAG_Y] != 0.0 or p[at.TAG_THETA] != 0.0
+    if moved or com[0] != body[1] or com[1] != body[2]:
+        c, s = math.cos(seen[t, 2]), math.sin(seen[t, 2])
+        ax += c * body[1] - s * body[2]
+        ay += s * body[1] + c * body[2]
+        c, s = math.cos(seen[t, 2] - p[at.TAG_THETA]), math.sin(seen[t, 2] - p[at.TAG_THETA])
+        bx, by = p[at.TAG_X] - com[0], p[at.TAG_Y] - com[1]
+        ax += c * bx - s * by
+        ay += s * bx + c * by
+    out[2] = tau + ax * out[1] - ay * out[0]
+
+
+@njit(cache=True, error_model="numpy")
+def to_truth(p: Array, told: Array, body: Array, com: Array, state: Array) -> None:
+    """Write where the true centre of mass is (6,) for a state of the nominal one as tags saw it (6,)."""
+    state[:6] = told[:6]
+    c, s = math.cos(told[2]), math.sin(told[2])
+    state[2] -= p[at.TAG_THETA]
+    tc, ts = math.cos(state[2]), math.sin(state[2])
+    bx, by = com[0] - p[at.TAG_X], com[1] - p[at.TAG_Y]
+    dx = tc * bx - ts * by - c * body[1] + s * body[2]
+    dy = ts * bx + tc * by - s * body[1] - c * body[2]
+    state[0] += dx
+    state[1] += dy
+    state[3] -= told[5] * dy
+    state[4] += told[5] * dx
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def as_seen(p: Array, state: Array, com: Array, out: Array) -> None:
+    """Write the pose of the body's frame (3,) as tags would see it."""
+    c, s = cos_sin(state[2])
+    bx, by = p[at.TAG_X] - com[0], p[at.TAG_Y] - com[1]
+    out[0] = state[0] + c * bx - s * by
+    out[1] = state[1] + s * bx + c * by
+    out[2] = state[2] + p[at.TAG_THETA]

@@ -1,0 +1,103 @@
+"""Settings of a diagnosis."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from pbrl_mismatch.effects.registry import EFFECTS, effect_named
+from pbrl_mismatch.errors import MismatchError
+from pbrl_model.parameters import nearest
+
+Share = Annotated[float, Field(gt=0.0, lt=1.0)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+KINDS = ("free", "caster", "wheel", "ground", "wheel+ground", "hinge")
+
+
+class DiagnoseOptions(BaseModel):
+    """Settings of `diagnose`.
+
+    Attributes:
+        objects: names to diagnose; empty: every object that was held.
+        without: effects that the library is to do without.
+        baseline: kinds of body that are no mismatch: "free", "caster" (one that is locked), "wheel" (one whose friction
+            has two axes), "ground" (friction of the whole body), "wheel+ground", "hinge" (a door); the best of them is
+            the baseline.
+        level: a p-value below this is a mismatch.
+        windows: lengths of the windows of the search, growing [s].
+        block: length of what is held out at a time [s].
+        every: one block of so many is held out.
+        draws: of an effect's prior for each three of its parameters, compared with the residual wrench; a quarter of
+            them where more moves than the body.
+        keep: how many of those are climbed from, for each length of window.
+        iterations: of a climb, for each length of window.
+        survivors: effects at most that go on to each next length of window, by evidence.
+        sensor_floor: size of the wrist sensor's own error in motion [N].
+        mass_spread: how well the nominal mass is known, as a standard deviation of its logarithm.
+        inertia_spread: the same of the inertia that the footprint suggests.
+        delay_spread: delay of poses that is no fault [s].
+        none_odds: prior odds that nothing was left out against any effect.
+        most_together: effects at most that are sought together.
+        workers: threads of the search; the bytes do not depend on it.
+        seed: of every random draw.
+
+    Raises:
+        MismatchError: an option is unknown or out of range.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    objects: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    baseline: tuple[str, ...] = ("free", "caster", "wheel")
+    level: Share = 0.05
+    windows: tuple[Positive, ...] = (0.5, 1.0, 2.0)
+    block: Positive = 4.0
+    every: Annotated[int, Field(ge=2, le=20)] = 4
+    draws: Annotated[int, Field(ge=8, le=100_000)] = 240
+    keep: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (6, 3, 2)
+    iterations: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (3, 6, 10)
+    survivors: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (9, 4)
+    sensor_floor: Positive = 0.15
+    mass_spread: Positive = 0.1
+    inertia_spread: Positive = 0.1
+    delay_spread: Positive = 0.005
+    none_odds: Positive = 1.0
+    most_together: Annotated[int, Field(ge=1, le=3)] = 2
+    workers: Annotated[int, Field(ge=1, le=256)] = 2
+    seed: Annotated[int, Field(ge=0)] = 0
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(str(part) for part in first["loc"])
+            if first["type"] == "extra_forbidden":
+                hint = nearest(place, list(type(self).model_fields))
+                raise MismatchError(f"diagnose options: unknown option {place!r}{hint}") from None
+            raise MismatchError(f"diagnose options: {place}: {first['msg']}, got {first['input']!r}") from None
+        for kind in self.baseline:
+            if kind not in KINDS:
+                raise MismatchError(f"diagnose options: expected baselines among {', '.join(KINDS)}, got {kind!r}")
+        if not self.baseline:
+            raise MismatchError(f"diagnose options: expected a baseline, one of {', '.join(KINDS)}, got none")
+        for name in self.without:
+            effect_named(name)
+        stages = {len(self.windows), len(self.keep), len(self.iterations)}
+        if (
+            len(stages) != 1
+            or len(self.survivors) != len(self.windows) - 1
+            or not self.windows
+            or list(self.windows) != sorted(self.windows)
+        ):
+            raise MismatchError(
+                "diagnose options: expected windows that grow, as many of keep and iterations, one survivor fewer, got "
+                f"{self.windows}, {self.keep}, {self.iterations}, {self.survivors}"
+            )
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Return the names of the library's effects that are used."""
+        return tuple(name for name in EFFECTS if name not in self.without)

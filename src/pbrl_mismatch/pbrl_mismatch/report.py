@@ -1,0 +1,177 @@
+"""What was found, in the form of `report.json`, and in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.effects.effect import Effect, Scene
+from pbrl_mismatch.effects.registry import EFFECTS
+from pbrl_mismatch.search.library import Fitted
+from pbrl_mismatch.search.predictive import Verdict
+from pbrl_mismatch.search.weigh import Weighed
+
+Array = NDArray[np.float64]
+
+NAMED = 0.5
+"""An effect is named where it is at least so probable; otherwise it is an alternative."""
+EXPLAINED = 1.35
+"""A hypothesis that needs a larger scale of the noise than this has not reached the noise floor."""
+SHARE_LEFT, NEAR = 0.1, 2.0
+"""Unless it leaves less than this share of the baseline's misfit unexplained, and needs a scale below this."""
+ALIKE = 3.0
+"""Hypotheses within so many nats explain the recording alike."""
+SHOWN = 8
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One effect of a hypothesis.
+
+    Attributes:
+        effect: its name.
+        probability: of the hypothesis.
+        parameters: mean, sd and unit by name.
+        where: frame and outline, or None.
+        when: intervals [s], or None.
+        direction: the frame in which its force keeps its direction, or what it follows.
+        fitted: the hypothesis.
+    """
+
+    effect: str
+    probability: float
+    parameters: Mapping[str, Mapping[str, float | str]]
+    where: Mapping[str, Any] | None
+    when: list[list[float]] | None
+    direction: str | None
+    fitted: Fitted
+
+    def to_report(self) -> dict[str, Any]:
+        """Return the form of `report.json`."""
+        return {
+            "effect": self.effect,
+            "probability": self.probability,
+            "parameters": {name: dict(values) for name, values in self.parameters.items()},
+            "where": None if self.where is None else dict(self.where),
+            "when": self.when,
+            "direction": self.direction,
+        }
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The named hypothesis, the others, and what must not be read into them."""
+
+    effects: tuple[Finding, ...]
+    alternatives: tuple[Finding, ...]
+    notes: tuple[str, ...]
+
+
+def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene) -> Findings:
+    """Decide what is named.
+
+    Args:
+        baseline: fitted.
+        weighed: hypotheses, likeliest first; empty where nothing was searched.
+        scene: what places are measured in.
+    """
+    others = [each for each in weighed if each.effects]
+    if not others:
+        return Findings((), (), ())
+    best, notes = others[0], []
+    count = baseline.peak.objective.observations
+    before, after = (float(each.peak.misfit[0]) / count - 1.0 for each in (baseline, best.fitted))
+    scale = best.fitted.noise_scale
+    reached = scale < EXPLAINED or (scale < NEAR and before > 0.0 and after < SHARE_LEFT * before)
+    named = best is weighed[0] and best.probability >= NAMED and reached and not best.vetoed
+    if not reached:
+        notes.append(
+            f"nothing in the library reaches the noise floor: the likeliest, {' and '.join(best.effects)}, "
+            f"is still off by {best.fitted.noise_scale:.1f} times the noise"
+        )
+    if not bool(best.fitted.peak.settled[0]):
+        notes.append(f"the fit of {' and '.join(best.effects)} had not settled: its numbers are rough")
+    alike = [each for each in others[1:] if each.log_weight > best.log_weight - ALIKE]
+    if alike:
+        notes.append(f"{' and '.join(' + '.join(e.effects) for e in (best, *alike))} explain this recording alike")
+    chosen = _described(best, scene) if named else ()
+    rest = others[1:] if named else others
+    alternatives = tuple(finding for each in rest[:SHOWN] for finding in _described(each, scene))
+    return Findings(chosen, alternatives, tuple(notes))
+
+
+def _described(weighed: Weighed, scene: Scene) -> tuple[Finding, ...]:
+    return tuple(_finding(weighed, EFFECTS[name], scene) for name in weighed.effects)
+
+
+def _finding(weighed: Weighed, effect: Effect, scene: Scene) -> Finding:
+    fitted = weighed.fitted
+    parameters = parameters_of(fitted, {each.column for each in effect.parameters(scene)})
+    values = {name: float(entry["mean"]) for name, entry in parameters.items()}
+    where = effect.where(values, scene) if effect.where is not None else None
+    moment = values.get(effect.when) if effect.when is not None else None
+    return Finding(
+        effect.name,
+        weighed.probability,
+        parameters,
+        None if where is None else {"frame": where.frame, "shape": np.round(where.shape, 4).tolist()},
+        None if moment is None else [[moment, scene.start + scene.seconds]],
+        effect.direction,
+        fitted,
+    )
+
+
+def parameters_of(fitted: Fitted, columns: set[str] | None = None) -> dict[str, dict[str, Any]]:
+    """Return mean, standard deviation and unit of free columns; positive ones by the moments of a log-normal."""
+    covariance = fitted.peak.covariance(0)
+    out = {}
+    for k, parameter in enumerate(fitted.hypothesis.parameters):
+        if columns is not None and parameter.column not in columns:
+            continue
+        value, variance = float(fitted.peak.coordinates[0, k]), float(covariance[k, k])
+        if parameter.positive:
+            variance = min(variance, 4.0)
+            mean = math.exp(value + 0.5 * variance)
+            sd = mean * math.sqrt(math.expm1(variance))
+        else:
+            mean, sd = value, math.sqrt(variance)
+        out[parameter.column] = {"mean": mean, "sd": sd, "unit": parameter.unit}
+    return out
+
+
+def held_out_report(baseline: Fitted, repaired: Fitted, floor: tuple[float, float]) -> dict[str, Any]:
+    """Return errors on what was held out before and after the repair, with the noise floor beside them."""
+    before, after = baseline.score, repaired.score
+
+    def entry(first: float | None, second: float | None, least: float) -> dict[str, float | None]:
+        return {"baseline": _number(first), "repaired": _number(second), "noise_floor": _number(least)}
+
+    return {
+        "rmse_position_m": entry(
+            before.rmse_position if before else None, after.rmse_position if after else None, floor[0]
+        ),
+        "rmse_yaw_rad": entry(before.rmse_yaw if before else None, after.rmse_yaw if after else None, floor[1]),
+        "log_score": {
+            "baseline": _number(before.log_score if before else None),
+            "repaired": _number(after.log_score if after else None),
+        },
+    }
+
+
+def _number(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
+
+
+def sentence(name: str, mismatch: bool, verdict: Verdict, found: Findings) -> str:
+    """Return the verdict in one sentence."""
+    if not mismatch:
+        return f"{name}: model and recording agree (p = {verdict.p_value:.2g})"
+    if not found.effects:
+        return f"{name}: something is left out (p = {verdict.p_value:.1g}), and it is none of what the library knows"
+    what = " and ".join(finding.effect for finding in found.effects)
+    return f"{name}: {what} is left out ({100 * found.effects[0].probability:.0f} %, p = {verdict.p_value:.1g})"

@@ -1,0 +1,1 @@
+"""Hypotheses fitted, weighed and tested."""

@@ -1,0 +1,155 @@
+"""A hypothesis: the baseline with some effects on; which columns are free, and what is believed of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene
+from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What is free, in coordinates u (K,): a column's value, or its logarithm, with a Gaussian prior.
+
+    Attributes:
+        effects: names of the effects that are on; empty: the baseline.
+        variant: which sub-model, for people: the baseline's kind and those of the effects.
+        parameters: free columns.
+        base: (WIDTH,) values of all others.
+    """
+
+    effects: tuple[str, ...]
+    variant: str
+    parameters: tuple[Parameter, ...]
+    base: Array
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Return the names of the free columns."""
+        return tuple(parameter.column for parameter in self.parameters)
+
+    @property
+    def mean(self) -> Array:
+        """Return (K,) the prior's mean."""
+        return np.array([parameter.mean for parameter in self.parameters])
+
+    @property
+    def spread(self) -> Array:
+        """Return (K,) the prior's standard deviation."""
+        return np.array([parameter.spread for parameter in self.parameters])
+
+    def rows(self, coordinates: Array) -> Array:
+        """Return (P, WIDTH) parameter rows of coordinates (P, K)."""
+        rows = np.tile(self.base, (len(coordinates), 1))
+        for k, parameter in enumerate(self.parameters):
+            value = coordinates[:, k]
+            rows[:, COLUMN[parameter.column]] = np.exp(np.clip(value, -30.0, 30.0)) if parameter.positive else value
+        return rows
+
+    def coordinates(self, rows: Array) -> Array:
+        """Return (P, K) coordinates of parameter rows (P, WIDTH)."""
+        columns = []
+        for parameter in self.parameters:
+            value = rows[:, COLUMN[parameter.column]]
+            columns.append(np.log(np.maximum(value, 1e-12)) if parameter.positive else value)
+        return np.column_stack(columns)
+
+    def sample_prior(self, rng: np.random.Generator, count: int) -> Array:
+        """Draw (count, K) coordinates."""
+        return self.mean + self.spread * rng.standard_normal((count, len(self.parameters)))
+
+    def with_effect(self, effect: Effect, scene: Scene, variant: int) -> Hypothesis:
+        """Return this with one effect more; a column that both have is taken as the effect has it."""
+        added = effect.chosen(scene, variant)
+        names = {parameter.column for parameter in added}
+        base = self.base.copy()
+        for column, value in (effect.fixed or {}).items():
+            base[COLUMN[column]] = value
+        kept = tuple(parameter for parameter in self.parameters if parameter.column not in names)
+        return replace(
+            self,
+            effects=(*self.effects, effect.name),
+            variant=f"{self.variant} + {effect.name}/{variant}",
+            parameters=(*kept, *added),
+            base=base,
+        )
+
+
+@dataclass(frozen=True)
+class BaselineOptions:
+    """What is believed of a body before any effect.
+
+    Attributes:
+        mass: [kg].
+        mass_spread: standard deviation of its logarithm.
+        inertia_spread: standard deviation of the logarithm of inertia over its nominal value.
+        delay_spread: standard deviation of the poses' delay that nobody would call a fault [s].
+    """
+
+    mass: float
+    mass_spread: float
+    inertia_spread: float
+    delay_spread: float
+
+
+def baselines(
+    options: BaselineOptions, kinds: Sequence[str], centroid: Array, half: Array, hinge: Mapping[str, float] | None
+) -> list[Hypothesis]:
+    """Return the baseline's kinds: "free", "caster" (one that is locked), "wheel", "ground", "hinge".
+
+    Args:
+        options: what is believed of mass, inertia and delay.
+        kinds: wanted; joined by "+" a kind has both.
+        centroid: (2,) of the footprint [m].
+        half: (2,) half the sides of its bounding box [m].
+        hinge: first guess of hinge_x, hinge_y, hinge_radius, where a kind has a hinge.
+    """
+    found = []
+    for kind in kinds:
+        base = neutral_row()
+        base[COLUMN["mass"]] = options.mass
+        parameters = [
+            Parameter("mass", options.mass, options.mass_spread, positive=True),
+            Parameter("inertia_factor", 1.0, options.inertia_spread, positive=True),
+            Parameter("delay", 0.0, options.delay_spread),
+        ]
+        parts = kind.split("+")
+        if "caster" in parts or "wheel" in parts:
+            base[COLUMN["cone"]], base[COLUMN["mu_y"]] = 1.0, -1.0
+            parameters += [
+                Parameter("wheel_x", float(centroid[0]), 0.8 * float(half[0])),
+                Parameter("wheel_y", float(centroid[1]), 0.8 * float(half[1])),
+                Parameter("mu_x", 0.1, 1.0, positive=True),
+            ]
+        if "wheel" in parts:
+            parameters += [
+                Parameter("wheel_theta", 0.0, 1.0),
+                Parameter("mu_y", 0.1, 1.0, positive=True),
+            ]
+        if "ground" in parts:
+            parameters.append(Parameter("mu_ground", 0.03, 1.0, positive=True))
+        if "hinge" in parts and hinge is not None:
+            # A handle's friction acts at its own point; where nothing turns, inertia cannot be told.
+            parameters = [p for p in parameters if p.column != "inertia_factor"]
+            parameters += [
+                Parameter("hinge_x", hinge["hinge_x"], 0.3),
+                Parameter("hinge_y", hinge["hinge_y"], 0.3),
+                Parameter("hinge_radius", hinge["hinge_radius"], 0.5, positive=True),
+                Parameter("mu_ground", 0.1, 1.5, positive=True),
+            ]
+            base[COLUMN["hinge_radius"]] = 1.0
+        found.append(Hypothesis((), kind, tuple(parameters), base))
+    return found
+
+
+def step_sizes(hypothesis: Hypothesis) -> Array:
+    """Return (K,) finite differences, a small share of each prior's spread."""
+    return np.clip(2e-3 * hypothesis.spread, 1e-5, math.inf)

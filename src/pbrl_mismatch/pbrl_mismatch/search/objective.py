@@ -1,0 +1,161 @@
+"""Misfit of a hypothesis over windows, with what is unknown in each window eliminated.
+
+In each window w the poses depend on the coordinates u and on nine nuisances z_w: six of the start, and a wrench that
+is constant over the window in the body's axes, of the size that a sensor's own error has; all with unit Gaussian
+priors. What is minimised is
+
+    sum_w (|r_w|^2 + |z_w|^2) / sigma^2 + |(u - m) / s|^2,
+
+r_w the residuals over their noise. Linearised, each z_w is solved for and put back (Schur complement): what is left are
+normal equations in u alone. A scale sigma of at least one widens everything where a model leaves much unexplained.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.data.cuts import Cuts
+from pbrl_mismatch.data.simulation import poses
+from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
+
+Array = NDArray[np.float64]
+
+START, WRENCH = 6, 3
+NUISANCES = START + WRENCH
+START_STEP, WRENCH_STEP = 0.05, 1.0
+"""Finite differences in the nuisances, in standard deviations."""
+CHUNK = 3_000_000
+"""Simulated numbers that are held at once."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A hypothesis linearised at P points.
+
+    Attributes:
+        residual: (P, W, R) recorded minus simulated, over noise.
+        slope: (P, W, R, K) of the simulated poses over noise, in u.
+        spread: (P, W, R, NUISANCES) the same in z.
+    """
+
+    residual: Array
+    slope: Array
+    spread: Array
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Misfit of one hypothesis over one set of windows.
+
+    Attributes:
+        hypothesis: what is free.
+        cuts: W windows.
+        floor: size of a sensor's own error [N]; as a torque, times the radius of gyration.
+    """
+
+    hypothesis: Hypothesis
+    cuts: Cuts
+    floor: float
+
+    @property
+    def observations(self) -> int:
+        """Return how many numbers were observed."""
+        return self.cuts.observations
+
+    def at_rest(self, count: int) -> Array:
+        """Return nuisances (count, W, NUISANCES) of zero."""
+        return np.zeros((count, len(self.cuts), NUISANCES))
+
+    def _simulated(self, rows: Array, nuisance: Array) -> Array:
+        """Return (P, W, N, 3) simulated poses."""
+        track = self.cuts.track
+        told = self.cuts.told + np.einsum("wkl,pwl->pwk", self.cuts.root, nuisance[..., :START])
+        scale = self.floor * np.array([1.0, 1.0, track.gyration])
+        return poses(rows, self.cuts, told, (nuisance[..., START:] * scale)[:, :, None, :])
+
+    def _residual(self, found: Array) -> Array:
+        difference = self.cuts.pose - found
+        difference[..., 2] -= 2 * np.pi * np.round(difference[..., 2] / (2 * np.pi))
+        bounded = np.nan_to_num(difference * self.cuts.weight, nan=1e6, posinf=1e6, neginf=-1e6)
+        return np.clip(bounded, -1e6, 1e6).reshape(len(found), len(self.cuts), -1)
+
+    def residual(self, coordinates: Array, nuisance: Array) -> Array:
+        """Return (P, W, R) residuals over noise, zero where nothing was seen.
+
+        Args:
+            coordinates: (P, K).
+            nuisance: (P, W, NUISANCES).
+        """
+        return self._residual(self._simulated(self.hypothesis.rows(coordinates), nuisance))
+
+    def misfit(self, residual: Array, nuisance: Array) -> Array:
+        """Return (P,) the data's part: squares of residuals and nuisances."""
+        return np.sum(residual**2, axis=(1, 2)) + np.sum(nuisance**2, axis=(1, 2))
+
+    def prior_misfit(self, coordinates: Array) -> Array:
+        """Return (P,) squares of the coordinates over their prior."""
+        return np.sum(((coordinates - self.hypothesis.mean) / self.hypothesis.spread) ** 2, axis=1)
+
+    def linearise(self, coordinates: Array, nuisance: Array) -> Linear:
+        """Take finite differences in every coordinate and nuisance, as many rows in one call as fit."""
+        count, free = coordinates.shape
+        steps = step_sizes(self.hypothesis)
+        moves = 1 + free + NUISANCES
+        u = np.repeat(coordinates, moves, axis=0).reshape(count, moves, free)
+        z = np.repeat(nuisance, moves, axis=0).reshape(count, moves, *nuisance.shape[1:])
+        for k in range(free):
+            u[:, 1 + k, k] += steps[k]
+        nuisance_steps = np.array([START_STEP] * START + [WRENCH_STEP] * WRENCH)
+        for k in range(NUISANCES):
+            z[:, 1 + free + k, :, k] += nuisance_steps[k]
+        flat, flat_z = u.reshape(-1, free), z.reshape(-1, *nuisance.shape[1:])
+        rows = self.hypothesis.rows(flat)
+        size = max(1, CHUNK // (self.cuts.pose.size * moves)) * moves
+        found = np.concatenate(
+            [self._simulated(rows[a : a + size], flat_z[a : a + size]) for a in range(0, len(rows), size)]
+        ).reshape(count, moves, *self.cuts.pose.shape)
+        residual = self._residual(found[:, 0])
+        change = (found[:, 1:] - found[:, :1]) * self.cuts.weight
+        change = np.clip(np.nan_to_num(change), -1e5, 1e5).reshape(count, moves - 1, len(self.cuts), -1)
+        change /= np.concatenate([steps, nuisance_steps])[:, None, None]
+        change = np.moveaxis(change, 1, -1)
+        return Linear(residual, change[..., :free], change[..., free:])
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Normal equations with the nuisances put back.
+
+    Attributes:
+        matrix: (P, K, K) of the data, not scaled by sigma, no prior.
+        vector: (P, K) likewise.
+        gain: (P, W, NUISANCES, K) how the best nuisances follow the coordinates.
+        shift: (P, W, NUISANCES) step of the nuisances for no step of the coordinates.
+        log_det: (P,) log determinants of the nuisances' matrices, summed.
+    """
+
+    matrix: Array
+    vector: Array
+    gain: Array
+    shift: Array
+    log_det: Array
+
+
+def reduce(linear: Linear, nuisance: Array) -> Reduced:
+    """Eliminate the nuisances (P, W, NUISANCES) from a linearisation."""
+    spread_t = np.swapaxes(linear.spread, -1, -2)
+    slope_t = np.swapaxes(linear.slope, -1, -2)
+    inner = spread_t @ linear.spread + np.eye(NUISANCES)
+    cross = spread_t @ linear.slope
+    pull = (spread_t @ linear.residual[..., None])[..., 0] - nuisance
+    solved = np.linalg.solve(inner, np.concatenate([cross, pull[..., None]], -1))
+    gain, shift = solved[..., :-1], solved[..., -1]
+    cross_t = np.swapaxes(cross, -1, -2)
+    matrix = np.sum(slope_t @ linear.slope - cross_t @ gain, axis=1)
+    along = (slope_t @ linear.residual[..., None])[..., 0]
+    vector = np.sum(along - (cross_t @ shift[..., None])[..., 0], axis=1)
+    _, log_det = np.linalg.slogdet(inner)
+    return Reduced(0.5 * (matrix + np.swapaxes(matrix, -1, -2)), vector, gain, shift, np.sum(log_det, axis=1))

@@ -1,0 +1,132 @@
+"""Posterior predictive test of a model: whether there is a wrench in its windows that it does not have.
+
+In each window the model may add a wrench that is straight between three knots. Whitened by the noise, the unknown
+starts and the sensor's own error, and freed of all that the model's own parameters could do, the poses split into what
+such a wrench would explain (D numbers) and the rest (R numbers). If the model is right both are noise, and
+
+    F = (|explained|^2 / D) / (|rest|^2 / R)  ~  F(D, R):
+
+the noise is estimated in the same breath, so that a tag which is a little better or worse than thought is no mismatch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+from scipy.stats import f as f_distribution
+
+from pbrl_mismatch.data.simulation import poses
+from pbrl_mismatch.search.climb import Peak
+
+Array = NDArray[np.float64]
+
+KNOTS = 3
+TEST_STEP = 0.3
+"""Finite difference in a knot's force [N]; times the radius of gyration for the torque."""
+TELLING = 0.05
+"""A direction that one newton moves by less than this many standard deviations tells nothing."""
+
+BELIEVED = frozenset({"mass", "inertia_factor", "delay"})
+"""Columns of the baseline of which something is known beforehand."""
+UNBELIEVABLE = 1e-3
+"""A conflict with that knowledge counts from here on; above, it leaves the p-value as the motion has it."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the test says.
+
+    Attributes:
+        p_value: chance of so large a misfit if the model were right.
+        statistic: F.
+        explained: D, numbers that a left-out wrench would explain.
+        rest: R, numbers that are noise either way.
+        noise_scale: root of the mean square of the rest: noise over what was thought.
+        by_window: (W,) mean square of what a wrench would explain in each window.
+    """
+
+    p_value: float
+    statistic: float
+    explained: int
+    rest: int
+    noise_scale: float
+    by_window: Array
+
+
+def belief_conflict(peak: Peak, row: int) -> float:
+    """Return the chance that what is believed of mass, inertia and delay is so far off (chi-square).
+
+    A fit that explains the poses with a mass or a delay that nobody would believe has left something out.
+    """
+    hypothesis = peak.objective.hypothesis
+    off = (peak.coordinates[row] - hypothesis.mean) / hypothesis.spread
+    held = [k for k, column in enumerate(hypothesis.columns) if column in BELIEVED]
+    return float(chi2.sf(np.sum(off[held] ** 2), len(held))) if held else 1.0
+
+
+def predictive_test(peak: Peak, row: int) -> Verdict:
+    """Test a fitted model on the windows of its objective.
+
+    Args:
+        peak: the fit.
+        row: which of its points.
+    """
+    objective = peak.objective
+    cuts, gyration = objective.cuts, objective.cuts.track.gyration
+    u, z = peak.coordinates[row : row + 1], peak.nuisance[row : row + 1]
+    linear = objective.linearise(u, z)
+    told = cuts.told + np.einsum("wkl,wl->wk", cuts.root, z[0, :, :6])
+    scale = objective.floor * np.array([1.0, 1.0, gyration])
+    extra = np.tile((z[0, :, 6:] * scale)[:, None, :], (1 + 3 * KNOTS, 1, KNOTS, 1)).reshape(
+        1 + 3 * KNOTS, len(cuts), KNOTS, 3
+    )
+    unit = np.array([1.0, 1.0, gyration])
+    for k in range(3 * KNOTS):
+        extra[1 + k, :, k // 3, k % 3] += TEST_STEP * unit[k % 3]
+    rows = np.repeat(objective.hypothesis.rows(u), 1 + 3 * KNOTS, 0)
+    found = poses(rows, cuts, np.repeat(told[None], len(rows), 0), extra)
+    push = ((found[1:] - found[:1]) * cuts.weight / TEST_STEP).reshape(3 * KNOTS, len(cuts), -1)
+    residual, slopes, pushes, owners = [], [], [], []
+    for w in range(len(cuts)):
+        seen = cuts.weight[w].reshape(-1) > 0.0
+        spread = linear.spread[0, w][seen]
+        # The residual that would be left with no nuisance, to first order; its covariance is I + S S^T.
+        centred = linear.residual[0, w][seen] + spread @ z[0, w]
+        whiten = np.linalg.inv(np.linalg.cholesky(np.eye(len(centred)) + spread @ spread.T))
+        residual.append(whiten @ centred)
+        slopes.append(whiten @ linear.slope[0, w][seen])
+        left, size, _ = np.linalg.svd(whiten @ push[:, w][:, seen].T, full_matrices=False)
+        pushes.append(left[:, size > TELLING])
+        owners.append(np.full(len(centred), w))
+    verdict = _split(np.concatenate(residual), np.concatenate(slopes), pushes, np.concatenate(owners), len(cuts))
+    conflict = belief_conflict(peak, row)
+    return replace(verdict, p_value=min(verdict.p_value, conflict)) if conflict < UNBELIEVABLE else verdict
+
+
+def _split(residual: Array, slopes: Array, pushes: list[Array], owners: NDArray[np.int64], windows: int) -> Verdict:
+    """Split the whitened residual into what wrenches explain and the rest, both free of the model's own slopes."""
+    sizes = [each.shape[1] for each in pushes]
+    basis = np.zeros((len(residual), sum(sizes)))
+    row = column = 0
+    for each in pushes:
+        basis[row : row + len(each), column : column + each.shape[1]] = each
+        row, column = row + len(each), column + each.shape[1]
+    norms = np.linalg.norm(slopes, axis=0)
+    own, strength, _ = np.linalg.svd(slopes[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
+    own = own[:, strength > 1e-6]
+    free = residual - own @ (own.T @ residual)
+    basis, upper = np.linalg.qr(basis - own @ (own.T @ basis))
+    basis = basis[:, np.abs(np.diag(upper)) > 1e-8]
+    explained = basis @ (basis.T @ free)
+    rest = free - explained
+    d = basis.shape[1]
+    r = max(len(residual) - d - own.shape[1], 1)
+    if d == 0:
+        return Verdict(1.0, 0.0, 0, r, float(np.sqrt(np.sum(rest**2) / r)), np.zeros(windows))
+    statistic = float(np.sum(explained**2) / d / max(np.sum(rest**2) / r, 1e-12))
+    squares = np.bincount(owners, explained**2, windows) / np.maximum(np.array(sizes), 1)
+    p_value = float(f_distribution.sf(statistic, d, r))
+    return Verdict(p_value, statistic, d, r, float(np.sqrt(np.sum(rest**2) / r)), squares)

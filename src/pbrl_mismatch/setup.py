@@ -1,0 +1,18 @@
+from setuptools import find_packages, setup
+
+NAME = "pbrl_mismatch"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Where simulation and recording part, why, and the repaired model.",
+    license="BSD-3-Clause",
+    packages=find_packages(),
+    package_data={NAME: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+    ],
+    install_requires=["numpy", "scipy", "numba", "pydantic"],
+    zip_safe=False,
+)

@@ -1,0 +1,44 @@
+"""The command `diagnose` on a recording of the contract: report, page, and one line for what a person can mend."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pbrl_bag import write_recording
+from pbrl_bringup.cli import run_arguments
+from pbrl_bringup.concealed.cases import Case, make
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    recording, _ = make(Case((), 1))
+    return write_recording(recording, tmp_path_factory.mktemp("clean") / "bag")
+
+
+def test_a_clean_recording_is_told_to_be_one(bag: Path, tmp_path: Path) -> None:
+    assert run_arguments(["diagnose", str(bag), "--out", str(tmp_path / "found")]) == 0
+    report = json.loads((tmp_path / "found" / "report.json").read_text())
+    assert set(report) == {"recording", "objects", "next_experiment", "seconds"}
+    found = report["objects"]["table"]
+    assert found["mismatch"] is False and found["p_value"] > 0.05 and found["effects"] == []
+    assert found["heldout"]["rmse_position_m"]["baseline"] == found["heldout"]["rmse_position_m"]["repaired"]
+    page = (tmp_path / "found" / "report.html").read_text()
+    assert page.count("<svg") >= 3 and 'href="http' not in page and "src=" not in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--baseline", "wheeel"], "expected baselines among"),
+        (["--without", "tehter"], "tether"),
+    ],
+)
+def test_options_that_do_not_fit_are_told(
+    bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
+) -> None:
+    assert run_arguments(["diagnose", str(bag), "--out", str(tmp_path / "found"), *arguments]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "found").exists()

@@ -1,0 +1,97 @@
+"""The unknown-input smoother recovers a wrench that nobody told it of, as surely as it says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch import MismatchError, residual_wrench, track_of
+from pbrl_mismatch.data.residual import accelerations
+from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
+
+MASS = 20.0
+
+
+def table_row(**values: float) -> np.ndarray:
+    row = neutral_row()
+    row[COLUMN["mass"]] = MASS
+    for name, value in values.items():
+        row[COLUMN[name]] = value
+    return row
+
+
+@pytest.fixture(scope="module")
+def track(concealed_recording: Callable[..., Recording]) -> Any:
+    return track_of(concealed_recording("clean", 1), "table")
+
+
+def test_it_recovers_an_injected_wrench_within_its_covariance(track: Any) -> None:
+    # The model is given a force and a moment that are not there: the smoother must find their negatives.
+    row = table_row(periodic_x=4.0, periodic_y=-2.0, periodic_torque=1.0, periodic_frequency=0.15)
+    found = residual_wrench(track, row)
+    wave = np.sin(2 * np.pi * 0.15 * track.clock)
+    wanted = -wave[:, None] * [4.0, -2.0, 1.0]
+    spread = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
+    off = (found.world - wanted) / spread
+    inside = np.mean(np.abs(off) < 1.96, axis=0)
+    assert np.all(inside > 0.85), inside
+    assert np.sqrt(np.mean((found.world - wanted) ** 2, axis=0))[0] < 0.45 * 4.0 / np.sqrt(2)
+
+
+def test_on_a_right_model_it_finds_nothing(track: Any) -> None:
+    found = residual_wrench(track, table_row())
+    assert found.size <= 1.0
+    assert np.mean(found.significance**2) < 1.5
+
+
+def test_coverage_of_a_random_wrench_is_as_stated(track: Any) -> None:
+    # A residual drawn from the smoother's own prior, over the same poses: its errors must be of the stated size.
+    rng, inside = np.random.default_rng(5), []
+    kept = np.exp(-track.dt / 0.4)
+    for _ in range(4):
+        drawn = np.zeros((len(track.clock), 3))
+        drawn[0] = rng.normal(size=3)
+        for t in range(1, len(drawn)):
+            drawn[t] = kept * drawn[t - 1] + np.sqrt(1 - kept**2) * rng.normal(size=3)
+        drawn *= 3.0 * np.array([1.0, 1.0, track.gyration])
+        taken = track.felt.copy()
+        c, s = track.mount[:, 0], track.mount[:, 1]
+        turned = np.stack([c * drawn[:, 0] + s * drawn[:, 1], -s * drawn[:, 0] + c * drawn[:, 1]], -1)
+        arm = track.mount[:, 2:]
+        track.felt[:, :2] -= turned
+        track.felt[:, 2] -= drawn[:, 2] - (arm[:, 0] * drawn[:, 1] - arm[:, 1] * drawn[:, 0])
+        found = residual_wrench(track, table_row(), size=3.0)
+        track.felt[:] = taken
+        spread = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
+        inside.append(np.abs(found.world - drawn) < 1.96 * spread)
+    share = np.mean(np.concatenate(inside), axis=0)
+    assert np.all((share > 0.90) & (share < 0.99)), share
+
+
+def test_body_axes_are_a_turn_of_world_axes(track: Any) -> None:
+    found = residual_wrench(track, table_row(), size=1.0)
+    np.testing.assert_allclose(np.hypot(*found.body[:, :2].T), np.hypot(*found.world[:, :2].T), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(found.body_covariance), np.linalg.det(found.covariance), rtol=1e-9)
+
+
+def test_the_same_recording_gives_the_same_bytes(track: Any) -> None:
+    one, other = residual_wrench(track, table_row()), residual_wrench(track, table_row())
+    assert one.world.tobytes() == other.world.tobytes()
+
+
+def test_accelerations_are_the_kernel_s(track: Any) -> None:
+    rows = np.stack([table_row(), table_row(steady_x=2.0)])
+    found = accelerations(track, rows, track.seen, 5)
+    np.testing.assert_allclose(found[1] - found[0], np.broadcast_to([0.1, 0.0, 0.0], found[0].shape), atol=1e-9)
+
+
+@pytest.mark.parametrize("options", [{"size": 0.0}, {"size": np.nan}, {"memory": -1.0}])
+def test_bad_options_are_refused(track: Any, options: dict[str, float]) -> None:
+    with pytest.raises(MismatchError, match="above zero"):
+        residual_wrench(track, table_row(), **options)
+    with pytest.raises(MismatchError, match="columns"):
+        residual_wrench(track, np.zeros(3))
