@@ -39,11 +39,11 @@ def test_every_command_has_help_with_an_example(name: str, capsys: pytest.Captur
 
 
 def test_the_contract_s_commands_are_there() -> None:
-    names = ["demo", "test", "fit", "simulate", "run", "record", "play", "info", "bench", "experiment"]
+    names = ["demo", "test", "fit", "diagnose", "simulate", "run", "record", "play", "info", "bench", "experiment"]
     assert sorted(names) == COMMANDS
 
 
-@pytest.mark.parametrize("name", ["demo", "fit", "simulate", "bench", "experiment"])
+@pytest.mark.parametrize("name", ["demo", "fit", "diagnose", "simulate", "bench", "experiment"])
 def test_randomness_has_a_seed(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     run_arguments([name, "--help"])
     assert "--seed" in capsys.readouterr().out
