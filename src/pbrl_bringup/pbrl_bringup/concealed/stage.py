@@ -29,7 +29,9 @@ WHEEL_SHARE = 0.5
 """Of the tables that have the one wheel of the baseline class."""
 ROOM = 6.0
 """Half the extent of the room [m]."""
-TRIES = 12
+FASTEST, SPINNING, SLIPPED = 0.4, 0.6, 0.008
+"""Of a push that counts: speed of the table [m/s], its turning [rad/s], way of its edge in the hand [m]."""
+TRIES = 24
 """Pushes that are drawn before a table counts as one that cannot be pushed."""
 
 
@@ -97,10 +99,19 @@ def draw_stage(rng: np.random.Generator) -> Stage:
         except SimError as error:  # a table without friction may have rolled on until the hand came back
             why = str(error)
             continue
-        if found.status == "done":
+        why = found.status if found.status != "done" else _violence(found)
+        if not why:
             return Stage(scene, pushes, seed, found.bodies[NAME])
-        why = found.status
     raise BringupError(f"concealed: expected one of {TRIES} drawn pushes to succeed, got {why!r} in the last")
+
+
+def _violence(found: HandRecording) -> str:
+    """Say what no careful robot would let happen, or nothing: a table that swings, an edge that slides in the hand."""
+    twist = found.bodies[NAME].twist
+    speed, spin = float(np.hypot(*twist[:, :2].T).max()), float(np.abs(twist[:, 2]).max())
+    if speed > FASTEST or spin > SPINNING:
+        return f"the table swings, {speed:.2f} m/s and {spin:.2f} rad/s"
+    return f"it slips by {1000.0 * found.slipped:.0f} mm in the hand" if found.slipped > SLIPPED else ""
 
 
 def play(stage: Stage, concealed: dict[str, object]) -> HandRecording:
