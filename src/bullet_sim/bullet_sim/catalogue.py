@@ -5,6 +5,7 @@ A body's own frame has its origin where its tag is glued, x forward and y left; 
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -85,9 +86,9 @@ class OnCasters(Settings):
         return np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
 
     @property
+    @abstractmethod
     def corner(self) -> Vector2:
         """Where the front left caster is [m] unless `caster_positions` says otherwise; the others mirror it."""
-        raise NotImplementedError
 
     @property
     def swivels(self) -> dict[str, Vector2]:

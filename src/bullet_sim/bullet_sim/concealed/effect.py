@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 
-class Effect:
+
+class Effect(ABC):
     """One thing that is true and not told.
 
     Attributes:
@@ -24,12 +26,12 @@ class Effect:
         """Name and target, as `tether.table_a`."""
         return f"{self.name}.{self.target}"
 
-    def update(self, time: float) -> None:
+    def update(self, time: float) -> None:  # noqa: B027 - most effects act by being there
         """Act on the next physics step, which begins at `time` [s]."""
 
+    @abstractmethod
     def strength(self) -> float:
         """Give how hard it acts now, in `unit`."""
-        raise NotImplementedError
 
     def acting(self) -> bool:
         """Tell whether it makes a difference now."""
