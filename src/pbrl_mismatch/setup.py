@@ -5,7 +5,7 @@ NAME = "pbrl_mismatch"
 setup(
     name=NAME,
     version="0.1.0",
-    description="Where simulation and recording part, why, and the repaired model.",
+    description="Where simulation and recording part, why, and the repaired model; mismatch_node.",
     license="BSD-3-Clause",
     packages=find_packages(),
     package_data={NAME: ["py.typed"]},
@@ -15,4 +15,9 @@ setup(
     ],
     install_requires=["numpy", "scipy", "numba", "pydantic"],
     zip_safe=False,
+    entry_points={
+        "console_scripts": [
+            "mismatch_node = pbrl_mismatch.ros.mismatch_node:main",
+        ],
+    },
 )

@@ -14,7 +14,9 @@ from pbrl_bringup.concealed.cases import Case, make
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    recording, _ = make(Case((), 1))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pbrl_bringup.concealed.stage.PUSHES", 1)
+        recording, _ = make(Case((), 3))
     return write_recording(recording, tmp_path_factory.mktemp("clean") / "bag")
 
 

@@ -46,7 +46,7 @@ def test_within_is_a_band(value: float, holds: bool) -> None:
 
 def test_every_bench_has_a_module() -> None:
     package = Path(measured.__code__.co_filename).parents[2] / "src/pbrl_bringup/pbrl_bringup"
-    assert all((package / f"benches/{name}.py").is_file() for name in BENCHES)
+    assert all((package / f"benches/{name.replace('-', '_')}.py").is_file() for name in BENCHES)
     assert all((package / f"experiments/{name.replace('-', '_')}.py").is_file() for name in EXPERIMENTS)
 
 

@@ -107,6 +107,7 @@ def concealed(effect: str, rng: np.random.Generator) -> dict[str, float]:
         "hidden_hinge": {"x": sign() * 0.5, "y": sign() * 0.28},
         "detent": {"force": u(8.0, 20.0), "x": 0.0, "y": 0.0, "width": u(0.03, 0.08)},
         "sloshing_load": {"mass": u(2.0, 5.0), "frequency": u(0.6, 1.2), "damping": u(0.03, 0.15)},
+        "grasp_compliance": {"give": u(4e-4, 1.2e-3)},
         "caster_swivel": {"trail": u(0.02, 0.05), "roll": u(0.015, 0.05)},
         "wrench_bias": {"x": force * c, "y": force * s, "tau": u(-0.5, 0.5)},
         "wrench_frame": {"scale": u(0.8, 1.25), "turn": u(0.15, 0.4) * sign()},

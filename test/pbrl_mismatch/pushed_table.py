@@ -25,6 +25,8 @@ REST = 2.5e-3
 SWEEPS = 6
 """Sweeps of sequential impulses over all points that rub."""
 HAND, HAND_DAMPING, TWIST, TWIST_DAMPING = 3000.0, 150.0, 60.0, 8.0
+RUBBER = 5e-5
+"""What the plates' rubber gives way as it should [m/N]; the arm behind the gripper is what is soft."""
 
 
 @dataclass(frozen=True)
@@ -222,11 +224,12 @@ class Table:
 
 
 def simulate(truth: Truth, rng: np.random.Generator) -> tuple[Array, Array, Array]:
-    """Return poses of the table (T + 1, 3), of the hand (T + 1, 3) and wrenches at the hand (T, 3), every 10 ms."""
+    """Return poses of the table (T + 1, 3), of the gripper (T + 1, 3) and wrenches there (T, 3), every 10 ms."""
     table, contact = Table(truth, rng), np.array(truth.contact)
+    give = truth.numbers["give"] if truth.effect == "grasp_compliance" else RUBBER
     rates, phases = rng.uniform(0.25, 1.1, 4), rng.uniform(0, 2 * math.pi, 4)
     hand, yaw, rate = None, table.state[2], np.zeros(2)
-    poses, hands, wrenches = [table.origin()], [], []
+    poses, grippers, wrenches = [table.origin()], [], []
     mean = np.zeros(3)
     steps = round(truth.seconds / STEP)
     for k in range(steps):
@@ -234,8 +237,8 @@ def simulate(truth: Truth, rng: np.random.Generator) -> tuple[Array, Array, Arra
         arm = table.turn(contact - table.com)
         point, velocity = table.state[:2] + arm, table.velocity(arm)
         hand = point.copy() if hand is None else hand
-        if not hands:
-            hands.append(np.array([*hand, yaw]))
+        if not grippers:
+            grippers.append(np.array([*point, table.state[2]]))
         ramp = min(1.0, time, truth.seconds - time)
         ahead = math.sin(rates[0] * time + phases[0]) + 0.6 * math.sin(2.3 * rates[1] * time + phases[1])
         aside = 0.9 * math.sin(rates[2] * time + phases[2]) + 0.5 * math.sin(2.9 * rates[3] * time + phases[3])
@@ -257,11 +260,9 @@ def simulate(truth: Truth, rng: np.random.Generator) -> tuple[Array, Array, Arra
         mean += wrench / EVERY
         if (k + 1) % EVERY == 0:
             poses.append(table.origin())
-            # The wrench is measured where the hand is, in world axes.
-            arm = table.turn(contact - table.com)
-            lever = table.state[:2] + arm - hand
-            mean[2] += lever[0] * mean[1] - lever[1] * mean[0]
+            # The gripper is a little ahead along the force, so that the moment about it is the one about the contact.
+            place = table.state[:2] + table.turn(contact - table.com) + give * mean[:2]
             wrenches.append(mean)
-            hands.append(np.array([*hand, yaw]))
+            grippers.append(np.array([*place, table.state[2]]))
             mean = np.zeros(3)
-    return np.array(poses), np.array(hands), np.array(wrenches)
+    return np.array(poses), np.array(grippers), np.array(wrenches)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from concealed_cases import concealed
+from scipy.stats import kstest
 
 from pbrl_bag.types import Recording, WrenchStream
 from pbrl_mismatch import DiagnoseOptions, Diagnosis, MismatchError, diagnose
+from pbrl_mismatch.diagnose import least_of_two, with_library
 from pbrl_model.errors import ModelError
 
 QUICK = {"keep": (3, 2, 1), "draws": 60, "survivors": (4, 2)}
@@ -45,11 +49,16 @@ def test_what_was_left_out_is_named_and_the_repair_predicts_better(found: Diagno
 def test_the_report_has_the_contract_s_form(found: Diagnosis) -> None:
     report = json.loads(json.dumps(found.to_report(), allow_nan=False))
     assert set(report) == {"recording", "objects", "next_experiment", "seconds"}
-    assert report["next_experiment"] is None
+    assert report["next_experiment"] is None  # one hypothesis has all the odds: no push would tell more
     table = report["objects"]["table"]
     assert set(table) == {
-        "mismatch", "p_value", "effects", "alternatives", "unexplained_fraction", "unknown", "heldout"
+        "mismatch", "p_value", "effects", "alternatives", "unexplained_fraction", "unknown", "heldout", "not_shown",
+        "unknown_description",
     }  # fmt: skip
+    assert table["unknown_description"] is None
+    for entry in table["not_shown"]:
+        assert set(entry) == {"effect", "smallest", "plausible", "unit", "chance", "motion"}
+        assert entry["effect"] != "viscous_drag"
     for entry in (*table["effects"], *table["alternatives"]):
         assert set(entry) == {"effect", "probability", "parameters", "where", "when", "direction"}
         for values in entry["parameters"].values():
@@ -70,12 +79,49 @@ def test_a_withheld_effect_is_unknown_rather_than_a_wrong_name(dragged: Recordin
     one = diagnose(dragged, options).objects["table"]
     assert one.mismatch and one.unknown and not one.effects
     assert any("noise floor" in note for note in one.notes)
+    described = json.loads(json.dumps(one.report["unknown_description"], allow_nan=False))
+    assert described["sentences"] and described["share_explained"] > 0.5
+    if one.next_push is not None:
+        push = one.next_push.to_report()
+        assert set(push) == {"object", "contact_point", "direction", "speed", "duration", "expected_bits"}
+        assert push["expected_bits"] >= 0.0
 
 
 def test_a_clean_recording_is_clean(concealed_recording: Callable[..., Recording]) -> None:
     one = diagnose(concealed_recording("clean", 1), DiagnoseOptions(baseline=("free",), **QUICK)).objects["table"]
     assert not one.mismatch and not one.effects and not one.unknown
     assert "agree" in one.notes[0]
+
+
+def test_a_soft_hold_is_named_though_the_motion_does_not_show_it(concealed_recording: Callable[..., Recording]) -> None:
+    recording = concealed_recording("grasp_compliance", 1)
+    few = without_all_but("grasp_compliance", "time_offset", "viscous_drag")
+    one = diagnose(recording, DiagnoseOptions(without=few, baseline=("free",), **QUICK)).objects["table"]
+    assert [finding.effect for finding in one.effects] == ["grasp_compliance"]
+    found = one.effects[0].parameters["grip_compliance"]
+    give = concealed("grasp_compliance", np.random.default_rng([1, 7]))["give"]
+    assert abs(found["mean"] - give) < 3.5 * found["sd"] < give
+
+
+def test_a_law_that_is_known_lowers_the_p_value_and_never_by_more_than_its_odds_allow() -> None:
+    assert with_library(0.5, -math.inf) == pytest.approx(0.5 / 0.9)
+    assert with_library(0.5, 20.0) == pytest.approx(10.0 * math.exp(-20.0))
+    assert with_library(1e-9, 3.0) == pytest.approx(1e-9 / 0.9)
+    assert with_library(1.0, 0.0) == 1.0
+    assert with_library(0.3, 1e4) == 0.0
+    # By Markov's inequality odds beyond 1 / a have a chance of a at most: both ways together keep the level.
+    rng = np.random.default_rng(0)
+    shift = rng.standard_normal(20_000)
+    odds = shift * 3.0 - 4.5  # of a law at three standard deviations, where there is none
+    values = np.array([with_library(p, o) for p, o in zip(rng.random(20_000), odds, strict=True)])
+    for level in (0.01, 0.05, 0.2):
+        assert np.mean(values < level) < level
+
+
+def test_of_two_tests_the_lesser_p_value_is_as_uniform_as_each() -> None:
+    one, other = np.random.default_rng(1).random((2, 4000))
+    values = [least_of_two(a, b) for a, b in zip(one, other, strict=True)]
+    assert kstest(values, "uniform").pvalue > 0.01
 
 
 def test_bad_input_is_refused_in_one_line(dragged: Recording) -> None:
@@ -111,9 +157,13 @@ def test_bad_input_is_refused_in_one_line(dragged: Recording) -> None:
         {"without": ("teter",)},
         {"baseline": ("wheels",)},
         {"levl": 0.1},
+        {"candidates": 0},
+        {"iterations": (3, 5)},
+        {"most_together": 4},
+        {"models": 3},
         {"baseline": ()},
     ],
 )
 def test_bad_options_are_refused(options: dict[str, object]) -> None:
-    with pytest.raises(MismatchError, match=r"expected|did you mean|greater"):
+    with pytest.raises(MismatchError, match=r"expected|did you mean|greater|less|valid"):
         DiagnoseOptions(**options)

@@ -125,6 +125,21 @@ def test_payload_changes_the_mass_at_its_time(bench: Any) -> None:
     change = np.diff(speeds(bench(pushed(10.0)).run(payload_mass=5.0, payload_time=1.0))[:, 0]) / DT
     assert change[20] == pytest.approx(10.0 / 20.0)
     assert change[150] == pytest.approx(10.0 / 25.0)
+    gone = bench(pushed(10.0)).run(payload_mass=5.0, payload_time=1.0, payload_gone=1.0)
+    change = np.diff(speeds(gone)[:, 0]) / DT
+    assert change[20] == pytest.approx(10.0 / 25.0)
+    assert change[150] == pytest.approx(10.0 / 20.0)
+
+
+def test_what_is_put_on_shares_the_momentum_and_what_is_taken_off_keeps_its_speed(bench: Any) -> None:
+    law = {"payload_mass": 5.0, "payload_time": 1.0}
+    put_on = speeds(bench(pushed(0.0), moving(0.5)).run(**law))[:, 0]
+    assert put_on[20] == pytest.approx(0.5) and put_on[-1] == pytest.approx(0.5 * 20.0 / 25.0)
+    taken_off = speeds(bench(pushed(0.0), moving(0.5)).run(**law, payload_gone=1.0))[:, 0]
+    np.testing.assert_allclose(taken_off, 0.5)
+    aside = bench(pushed(0.0), moving(0.0, 0.4)).run(**law, payload_x=0.3)
+    inertia = INERTIA + 5.0 * 20.0 / 25.0 * 0.3**2
+    assert speeds(aside)[-1, 2] == pytest.approx(0.4 * INERTIA / inertia)
 
 
 def test_swinging_load_moves_as_two_masses_on_a_spring(bench: Any) -> None:
@@ -132,12 +147,21 @@ def test_swinging_load_moves_as_two_masses_on_a_spring(bench: Any) -> None:
 
     def two(_: float, y: np.ndarray) -> list[float]:
         spring = load * (rate**2 * y[2] + 2 * zeta * rate * y[3])
-        a = (8.0 + spring) / MASS
+        a = (8.0 + spring) / (MASS - load)  # the load is part of what the body weighs
         return [y[1], a, y[3], -a - rate**2 * y[2] - 2 * zeta * rate * y[3]]
 
     wanted = solve_ivp(two, (0, 2.0), [0, 0, 0, 0], rtol=1e-9, t_eval=[1.0, 2.0]).y[0]
     path = bench(pushed(8.0)).run(slosh_mass=load, slosh_frequency=0.7, slosh_damping=zeta)
     np.testing.assert_allclose(path[[100, 200], 0], wanted, rtol=0.03)
+
+
+def test_a_load_on_a_stiff_spring_is_a_weight_where_it_hangs(bench: Any) -> None:
+    load, place = 5.0, 0.3
+    path = bench(pushed(8.0, 60)).run(slosh_mass=load, slosh_y=place, slosh_frequency=6.0, slosh_damping=0.7)
+    # One rigid body: the push is off the common centre of mass.
+    arm = load * place / MASS
+    inertia = INERTIA * (1.0 - load / MASS) + load * (1.0 - load / MASS) * place**2
+    assert speeds(path)[-1, 2] == pytest.approx(8.0 * arm / inertia * 0.6, rel=0.05)
 
 
 def test_tether_is_slack_within_its_length_and_pulls_beyond(bench: Any) -> None:
@@ -153,6 +177,14 @@ def test_external_force_adds_up(bench: Any) -> None:
     assert path[-1, 1] == pytest.approx(0.5 * 2.0 / MASS * 4.0, rel=0.01)
     # The mean of the speed under a sine that begins at zero is a quarter wave's share.
     assert path[-1, 0] == pytest.approx(6.0 / MASS / (np.pi) * 2.0, rel=0.02)
+
+
+def test_a_push_between_two_moments_gives_its_impulse(bench: Any) -> None:
+    path = bench(pushed(0.0, 300)).run(steady_x=6.0, force_start=0.8, force_end=2.0)
+    speed = speeds(path)[:, 0]
+    np.testing.assert_allclose(speed[:70], 0.0, atol=1e-12)
+    assert speed[-1] == pytest.approx(6.0 * 1.2 / MASS, rel=1e-3)
+    assert np.ptp(speed[210:]) < 1e-12
 
 
 def test_obstacle_holds_with_its_stiffness(bench: Any) -> None:
@@ -172,6 +204,26 @@ def test_hidden_hinge_holds_its_point(bench: Any) -> None:
     held = path[:, :2] - 0.5 * np.stack([np.cos(path[:, 2]), np.sin(path[:, 2])], -1)
     assert np.abs(held - [-0.5, 0.0]).max() < 0.005
     assert path[-1, 2] > 0.5
+
+
+@pytest.mark.parametrize("zeta", [0.1, 0.5])
+def test_hidden_hinge_swings_as_its_give_and_damping_say(bench: Any, zeta: float) -> None:
+    dt, stiffness = 5e-4, 2000.0
+    rate = np.sqrt(stiffness / MASS)
+    wanted = solve_ivp(
+        lambda _, y: [y[1], -(rate**2) * y[0] - 2 * zeta * rate * y[1]], (0, 0.6), [0.0, 0.2], rtol=1e-9, t_eval=[0.6]
+    ).y[0]
+    times = bench(pushed(0.0, 1200), moving(0.2), dt)
+    path = times.run(pivot_stiffness=stiffness, pivot_damping=zeta)
+    assert path[-1, 0] == pytest.approx(wanted[0], abs=0.01 * 0.2 / rate)
+
+
+def test_a_catch_that_holds_a_point_turns_the_body(bench: Any) -> None:
+    law = {"detent_force": 10.0, "detent_width": 0.05, "detent_at_y": 0.3}
+    path = bench(pushed(0.0, 3)).run(**law, detent_x=0.05, detent_y=0.3)
+    push = speeds(path)[1] / DT
+    assert push[0] * MASS == pytest.approx(10.0, rel=0.02)
+    assert push[2] * INERTIA == pytest.approx(-0.3 * push[0] * MASS, rel=0.02)
 
 
 def test_detent_pulls_hardest_at_its_width(bench: Any) -> None:
@@ -194,13 +246,32 @@ def test_casters_that_follow_resist_along_the_way(bench: Any) -> None:
 
 def test_faults_of_the_force_sensor_are_undone(bench: Any) -> None:
     plain = bench(pushed(10.0)).run()
-    scaled = bench(pushed(12.0)).run(force_scale=1.2)
+    scaled = bench(pushed(12.0)).run(force_scale=1.2, torque_scale=1.0)
     biased = bench(pushed(10.0) + np.array([1.0, -2.0, 0.3])).run(bias_x=1.0, bias_y=-2.0, bias_torque=0.3)
     turned = bench(np.tile([10.0 * np.cos(0.3), 10.0 * np.sin(0.3), 0.0], (200, 1))).run(sensor_turn=0.3)
     drift = 0.5 * DT * np.arange(200)[:, None] * [1.0, 0.0, 0.0]
     drifted = bench(pushed(10.0) + drift).run(drift_x=0.5)
     for other in (scaled, biased, turned, drifted):
         np.testing.assert_allclose(other, plain, atol=1e-12)
+
+
+def test_a_scale_of_the_force_is_the_torque_s_where_none_is_told(bench: Any) -> None:
+    wrench = np.tile([6.0, 2.0, 1.5], (100, 1))
+    plain = bench(wrench).run()
+    np.testing.assert_allclose(bench(1.3 * wrench).run(force_scale=1.3, torque_scale=-1.0), plain, atol=1e-12)
+    other = bench(wrench * [1.3, 1.3, 0.8]).run(force_scale=1.3, torque_scale=0.8)
+    np.testing.assert_allclose(other, plain, atol=1e-12)
+
+
+def test_an_offset_acts_from_its_moment_on_and_one_from_before_the_grasp_is_known(bench: Any) -> None:
+    plain = bench(pushed(10.0)).run()
+    law = {"bias_x": 2.0, "bias_torque": -0.4}
+    since = (DT * np.arange(200) > 1.02)[:, None] * [2.0, 0.0, -0.4]
+    later = bench(pushed(10.0) + since).run(**law, bias_start=1.02)
+    np.testing.assert_allclose(later[:97], plain[:97], atol=1e-12)
+    # It comes on over some steps, as much before its moment as after.
+    np.testing.assert_allclose(speeds(later)[-1], speeds(plain)[-1], atol=1e-3)
+    np.testing.assert_allclose(bench(pushed(10.0)).run(**law, bias_start=-1.0), plain, atol=1e-12)
 
 
 def test_time_offset_shifts_the_wrench(bench: Any) -> None:

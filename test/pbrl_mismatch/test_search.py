@@ -15,9 +15,9 @@ from pbrl_mismatch import EFFECTS, track_of
 from pbrl_mismatch.data.cuts import cut_windows, held_out_blocks, inside, touching
 from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.search.climb import climb
+from pbrl_mismatch.search.fitted import scene_of
 from pbrl_mismatch.search.heldout import held_out_score, noise_floor
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.library import scene_of
 from pbrl_mismatch.search.objective import NUISANCES, Objective, reduce
 from pbrl_mismatch.search.predictive import predictive_test
 
@@ -82,7 +82,9 @@ def test_evidence_of_a_linear_model_is_its_closed_form(track: Any, free: Any) ->
     rng, cuts = np.random.default_rng(5), cut_windows(track, 0.5).take(np.arange(6))
     slope = free.with_effect(EFFECTS["floor_slope"], scene_of(track, free.rows(free.mean[None])[0]), 0)
     slope = replace(slope, parameters=slope.parameters[-2:], base=free.rows(free.mean[None])[0])
-    objective = Objective(slope, drawn(rng, cuts, slope.base), FLOOR)
+    data = drawn(rng, cuts, slope.base)
+    # Noise is thought to be larger than it is, so that no window asks for a scale.
+    objective = Objective(slope, replace(data, weight=0.5 * data.weight), FLOOR)
     fit = climb(objective, np.zeros((1, 2)), iterations=6)
     linear = objective.linearise(np.zeros((1, 2)), objective.at_rest(1))
     value = 0.0
@@ -95,7 +97,36 @@ def test_evidence_of_a_linear_model_is_its_closed_form(track: Any, free: Any) ->
     joint += np.eye(len(joint)) + s @ s.T
     residual = linear.residual[0].reshape(-1)
     value = -0.5 * residual @ np.linalg.solve(joint, residual) - 0.5 * np.linalg.slogdet(joint)[1]
+    np.testing.assert_array_equal(fit.weight, 1.0)
     assert fit.evidence[0] == pytest.approx(value, abs=0.3)
+
+
+def test_a_window_s_scale_is_its_likeliest_that_is_at_least_one(track: Any, free: Any) -> None:
+    objective = Objective(free, cut_windows(track, 1.0).take(np.arange(4)), FLOOR)
+    counts = objective.counts
+    misfit = counts * np.array([0.3, 1.0, 4.0, 30.0])
+    scales = np.exp(np.linspace(0.0, 3.0, 3001))[:, None]
+    likelihood = -0.5 * misfit / scales**2 - counts * np.log(scales)
+    assert objective.likelihood(misfit[None])[0] == pytest.approx(likelihood.max(axis=0).sum(), rel=1e-6)
+    np.testing.assert_allclose(objective.weights(misfit[None])[0] ** -0.5, [1.0, 1.0, 2.0, 30.0**0.5])
+    even = replace(objective, even=True)
+    common = -0.5 * misfit.sum() / scales**2 - counts.sum() * np.log(scales)
+    assert even.likelihood(misfit[None])[0] == pytest.approx(common.max(), rel=1e-6)
+    assert np.ptp(even.weights(misfit[None])) == 0.0
+
+
+def test_a_window_that_nothing_explains_is_as_good_as_left_out(track: Any, free: Any) -> None:
+    rng, cuts = np.random.default_rng(7), cut_windows(track, 1.0).take(np.arange(10))
+    data = drawn(rng, cuts, free.rows(free.mean[None])[0])
+    knocked = data.pose.copy()
+    knocked[4, :, 0] += 0.2 * np.linspace(0.0, 1.0, knocked.shape[1]) ** 2
+    knock = replace(data, pose=knocked)
+    fit, common = (climb(Objective(free, knock, FLOOR, even), free.mean[None]) for even in (False, True))
+    without = climb(Objective(free, data.take(np.arange(10) != 4), FLOOR), free.mean[None])
+    spread = np.sqrt(np.diag(without.covariance(0)))
+    off, dragged = (np.abs((each.coordinates - without.coordinates) / spread).max() for each in (fit, common))
+    assert off < 0.5 and dragged > 5.0 * off
+    assert fit.weight[0, 4] < 0.1 and np.delete(fit.weight[0], 4).min() > 0.4
 
 
 def test_elimination_is_the_joint_solution(track: Any, free: Any) -> None:
@@ -104,7 +135,8 @@ def test_elimination_is_the_joint_solution(track: Any, free: Any) -> None:
     z = objective.at_rest(1)
     linear = objective.linearise(free.mean[None], z)
     reduced = reduce(linear, z)
-    step = np.linalg.solve(reduced.matrix[0] + np.eye(3), reduced.vector[0])
+    matrix, vector = reduced.weighed(np.ones((1, len(cuts))))
+    step = np.linalg.solve(matrix[0] + np.eye(3), vector[0])
     size, k = linear.residual.shape[2], 3
     slope = np.zeros((3 * size, k + 3 * NUISANCES))
     for w in range(3):

@@ -19,6 +19,7 @@ NODES = [
     ("pbrl_control", "body_controller_node"),
     ("pbrl_control", "push_node"),
     ("pbrl_model", "model_node"),
+    ("pbrl_mismatch", "mismatch_node"),
 ]
 
 
@@ -59,6 +60,7 @@ def test_every_package_is_in_the_index(package: str) -> None:
         ("krang_sim", "sim_node", 'scene:="locked_castor"', "locked_caster"),
         ("pbrl_control", "push_node", 'plan:="turn_tabel"', "turn_table"),
         ("pbrl_model", "model_node", 'priors:="nowhere.yaml"', "nowhere.yaml"),
+        ("pbrl_mismatch", "mismatch_node", "without:=['carpet']", "carpet"),
         ("pbrl_bag", "player_node", 'bag:="nowhere"', "nowhere"),
     ],
 )

@@ -19,6 +19,7 @@ from bullet_sim.catalogue import Body
 from bullet_sim.concealed.checks import check_concealed
 from bullet_sim.concealed.options import Concealed
 from bullet_sim.errors import SimError, nearest
+from bullet_sim.model_file import concealed_of
 from bullet_sim.placing import placed_footprint
 from bullet_sim.settings import (
     Fraction,
@@ -27,6 +28,7 @@ from bullet_sim.settings import (
     Positive,
     Settings,
     Vector3,
+    parse_settings,
     read_settings,
 )
 
@@ -132,7 +134,12 @@ class Sensors(Settings):
 
 
 class Scene(Settings):
-    """One scene, known and concealed parts together."""
+    """One scene, known and concealed parts together.
+
+    Attributes:
+        models: file of a learned model by the body that is to behave so; read by `load_scene` into `concealed`. A path
+            that is not absolute is taken from the scene's file.
+    """
 
     name: str = "scene"
     room: Room
@@ -141,6 +148,7 @@ class Scene(Settings):
     goal: Goal | None = None
     sensors: Sensors = Sensors()
     concealed: Concealed = Concealed()
+    models: dict[str, str] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _names_meet(self) -> Self:
@@ -191,7 +199,36 @@ def load_scene(path: str | Path) -> Scene:
     if file.suffix not in (".yaml", ".yml") and not file.exists():
         file = _shipped(str(path))
     scene = read_settings(file, Scene)
+    for body, model in scene.models.items():
+        scene = with_model(scene, file.parent / model, body)
     return scene if "name" in scene.model_fields_set else scene.model_copy(update={"name": file.stem})
+
+
+def with_model(scene: Scene, path: Path, body: str | None = None) -> Scene:
+    """Return a scene in which a body behaves as a learned model says.
+
+    Args:
+        scene: where it stands.
+        path: file of the model.
+        body: its name in the scene; None: as the model has it.
+
+    Raises:
+        SimError: the file cannot be used, such a thing cannot be in this scene, or it is concealed there already.
+    """
+    told = scene.concealed.model_dump(exclude_unset=True)
+    for key, value in concealed_of(path, scene.bodies, body).items():
+        if isinstance(value, list):
+            told[key] = [*told.get(key, ()), *value]
+        elif key == "floor_slope" and told.get(key):
+            raise SimError(f"{path}: concealed.{key}: expected a scene that does not say it, got one that does")
+        elif key == "floor_slope":
+            told[key] = value
+        elif set(value) & set(told.get(key, {})):
+            name = next(iter(set(value) & set(told[key])))
+            raise SimError(f"{path}: concealed.{key}.{name}: expected a scene that does not say it, got one that does")
+        else:
+            told[key] = {**told.get(key, {}), **value}
+    return parse_settings({**scene.model_dump(exclude_unset=True), "concealed": told}, Scene, str(path))
 
 
 def scene_folder() -> Path:

@@ -157,6 +157,10 @@ def diagnose(
     without: Annotated[
         list[str] | None, typer.Option(help="An effect that the library does without, as often as needed.")
     ] = None,
+    mass_spread: Annotated[
+        float | None,
+        typer.Option(help="How well the mass that was told is known: 0.2 is to 20 %. Default: 0.1."),
+    ] = None,
     seed: Seed = 0,
     workers: Annotated[
         int, typer.Option(min=1, max=256, help="Threads; the result does not depend on their number.")
@@ -170,6 +174,7 @@ def diagnose(
         out=out,
         baseline=baseline or [],
         without=without or [],
+        mass_spread=mass_spread,
         seed=seed,
         workers=workers,
     )
@@ -236,9 +241,20 @@ def bench(
     quick: Annotated[
         bool, typer.Option("--quick", help="A smaller version that still measures, under a minute.")
     ] = False,
+    sets: Annotated[
+        str | None,
+        typer.Option(
+            help="Sets of cases of the bench concealed, with commas: clean, single, pairs, withheld, furnished, rough. "
+            "Default: all."
+        ),
+    ] = None,
+    most: Annotated[
+        int | None, typer.Option(min=1, help="Recordings an effect at most, and ten times as many clean ones.")
+    ] = None,
 ) -> int:
     """Measure one group of acceptance rows; the last line is the report as JSON."""
-    return _hand_over("bench", name=name, out=out, seed=seed, quick=quick)
+    wanted = [each.strip() for each in sets.split(",")] if sets is not None else []
+    return _hand_over("bench", name=name, out=out, seed=seed, quick=quick, sets=wanted, most=most)
 
 
 @app.command(epilog="Example: ./pbrl experiment sample-efficiency --quick")

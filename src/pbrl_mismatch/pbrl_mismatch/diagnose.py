@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,37 +13,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bag.types import Recording
+from pbrl_mismatch.data.grip import GripTrack, lay_grips
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
-from pbrl_mismatch.data.track import Track, lay_track
+from pbrl_mismatch.data.track import Track, after_closing, lay_track
 from pbrl_mismatch.errors import MismatchError
+from pbrl_mismatch.next_experiment.candidates import Reach
+from pbrl_mismatch.next_experiment.experiment import NextExperiment, next_experiment
+from pbrl_mismatch.observability.detectable import could_not_show
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.report import Finding, findings_of, held_out_report, sentence
+from pbrl_mismatch.search.explain import explain, held_against
+from pbrl_mismatch.search.fitted import Fitted, Stages, cut_stages, fit_baseline, hinge_guess, judged, scene_of
+from pbrl_mismatch.search.grip import beside_motion, grip_evidence
 from pbrl_mismatch.search.heldout import noise_floor
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.library import (
-    Fitted,
-    Stages,
-    cut_stages,
-    fit_baseline,
-    hinge_guess,
-    scene_of,
-    search_library,
-)
+from pbrl_mismatch.search.library import IN_ANOTHER_CHANNEL
 from pbrl_mismatch.search.predictive import Verdict, predictive_test
-from pbrl_mismatch.search.weigh import Weighed, weigh
+from pbrl_mismatch.search.told_baseline import ToldBaseline, baseline_from_model
+from pbrl_mismatch.search.weigh import Weighed
+from pbrl_mismatch.unknown.describe import describe_unknown
 from pbrl_model.fitting.fit import body_of, motions_of
 from pbrl_model.predict import UNKNOWN_MASS
 
 Array = NDArray[np.float64]
 
 LEAST_FORCE = 1e-9
+LIBRARY_SHARE = 0.1
+"""Of the level of the test that the library's odds have."""
 UNKNOWN_MASS_SPREAD = 1.0
-GROUNDS_OF_SETS = 2
-"""So many of the likeliest hypotheses are tried with one effect more."""
-NEAR_THE_FLOOR = 1.1
-"""A hypothesis that needs less than this scale of the noise leaves nothing worth another effect."""
-WORTH_A_KIND = 3.0
-"""A kind of baseline with more parameters is worth a search of its own where it is better by this [nat]."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +59,7 @@ class ObjectDiagnosis:
         residual: wrench that the baseline lacks.
         report: this object's part of `report.json`.
         notes: what must not be read into it, in sentences.
+        next_push: the push that would tell most of the hypotheses apart; None where there is nothing to tell.
     """
 
     mismatch: bool
@@ -75,6 +73,7 @@ class ObjectDiagnosis:
     residual: ResidualWrench
     report: Mapping[str, Any]
     notes: tuple[str, ...]
+    next_push: NextExperiment | None = None
 
     @property
     def repaired(self) -> Fitted:
@@ -92,10 +91,11 @@ class Diagnosis:
 
     def to_report(self) -> dict[str, Any]:
         """Return `report.json` of the command `diagnose`."""
+        pushes = [found.next_push for found in self.objects.values() if found.next_push is not None]
         return {
             "recording": str(self.recording),
             "objects": {name: dict(found.report) for name, found in self.objects.items()},
-            "next_experiment": None,
+            "next_experiment": max(pushes, key=lambda each: each.expected_bits).to_report() if pushes else None,
             "seconds": self.seconds,
         }
 
@@ -124,9 +124,11 @@ def diagnose(recording: Recording, options: DiagnoseOptions | None = None) -> Di
     if not names:
         raise MismatchError(f"{recording.path}: expected at least one grasp to diagnose, got none")
     seeds = np.random.SeedSequence(chosen.seed).spawn(len(names))
-    objects = {
-        name: _diagnose_object(seed, track_of(recording, name), chosen) for name, seed in zip(names, seeds, strict=True)
-    }
+    room = recording.room if len(recording.room) else None
+    objects = {}
+    for name, each in zip(names, seeds, strict=True):
+        track = track_of(recording, name)
+        objects[name] = _diagnose_object(each, track, lay_grips(recording, track), room, chosen)
     return Diagnosis(recording.path, objects, time.perf_counter() - started)
 
 
@@ -137,20 +139,42 @@ def track_of(recording: Recording, name: str) -> Track:
         MismatchError: nothing was felt while it was held.
         ModelError: a stream is missing or broken, or the object never moved.
     """
-    motions = motions_of(recording, name)
+    motions = [after_closing(motion) for motion in motions_of(recording, name)]
     if max(float(np.abs(motion.wrench).max()) for motion in motions) < LEAST_FORCE:
         raise MismatchError(f"{name}: expected a force while it was held, got zero throughout; was the sensor on?")
     geometry = recording.bodies[name]
     return lay_track(recording, motions, geometry, body_of(geometry, motions[0].oriented))
 
 
-def fit_baselines(rng: np.random.Generator, track: Track, stages: Stages, options: DiagnoseOptions) -> list[Fitted]:
-    """Fit every kind of baseline, best first."""
+def told_baseline(name: str, options: DiagnoseOptions) -> ToldBaseline | None:
+    """Return the model that was told of an object, or None.
+
+    Raises:
+        ModelError: a file cannot be read.
+        MismatchError: it is of something that cannot be simulated.
+    """
+    told = [
+        baseline_from_model(path, inertia_spread=options.inertia_spread, delay_spread=options.delay_spread)
+        for path in options.models
+    ]
+    return next((each for each in told if each.object == name), None)
+
+
+def fit_baselines(
+    rng: np.random.Generator,
+    track: Track,
+    stages: Stages,
+    options: DiagnoseOptions,
+    told: ToldBaseline | None = None,
+) -> list[Fitted]:
+    """Fit every kind of baseline, best first; of a told model there is one kind."""
+    if told is not None:
+        return [fit_baseline(rng, track, told.hypothesis, stages, options)]
     lower, upper = track.outline.min(axis=0), track.outline.max(axis=0)
-    told = not math.isnan(track.nominal_mass)
+    known = not math.isnan(track.nominal_mass)
     believed = BaselineOptions(
-        track.nominal_mass if told else UNKNOWN_MASS,
-        options.mass_spread if told else UNKNOWN_MASS_SPREAD,
+        track.nominal_mass if known else UNKNOWN_MASS,
+        options.mass_spread if known else UNKNOWN_MASS_SPREAD,
         options.inertia_spread,
         options.delay_spread,
     )
@@ -162,22 +186,51 @@ def fit_baselines(rng: np.random.Generator, track: Track, stages: Stages, option
     return sorted(fitted, key=lambda each: -each.evidence)
 
 
-def _diagnose_object(seed: np.random.SeedSequence, track: Track, options: DiagnoseOptions) -> ObjectDiagnosis:
-    first, second = seed.spawn(2)
+def least_of_two(one: float, other: float) -> float:
+    """Return the p-value of the lesser of two independent ones (Sidak)."""
+    return 1.0 - (1.0 - min(one, other)) ** 2
+
+
+def with_library(p_value: float, log_odds: float) -> float:
+    """Return a p-value that the library has a say in.
+
+    The test against any wrench whatever spreads its power; a law that is known has all of it in one place. By Markov's
+    inequality the odds of the library are a test too: under no mismatch they exceed 1 / a with chance a at most.
+
+    Args:
+        p_value: of the test against any wrench.
+        log_odds: of any effect of the library against none, at even prior odds.
+    """
+    by_library = math.exp(-max(log_odds, 0.0)) if log_odds < 700.0 else 0.0
+    return min(p_value / (1.0 - LIBRARY_SHARE), by_library / LIBRARY_SHARE, 1.0)
+
+
+def _diagnose_object(
+    seed: np.random.SeedSequence, track: Track, grips: GripTrack | None, room: Array | None, options: DiagnoseOptions
+) -> ObjectDiagnosis:
+    first, second, third = seed.spawn(3)
+    told = told_baseline(track.object, options)
+    if told is not None:
+        options = options.model_copy(update={"without": (*options.without, *told.effects)})
     stages = cut_stages(track, options)
-    bases = fit_baselines(np.random.default_rng(first), track, stages, options)
-    baseline = bases[0]
-    verdict = predictive_test(baseline.peak, 0)
+    bases = fit_baselines(np.random.default_rng(first), track, stages, options, told)
+    grip = grip_evidence(grips, options.delay_spread) if grips is not None else None
+    bases = [beside_motion(each, grip) for each in bases]
+    baseline = judged(bases[0], stages, options, even=True)
+    verdict = predictive_test(baseline.over_shorter().peak, 0)
+    p_value = verdict.p_value if grip is None else least_of_two(verdict.p_value, grip.p_value)
+    explained = explain(second, track, bases, stages, grip, options)
+    verdict = replace(verdict, p_value=with_library(p_value, explained.log_odds))
     mismatch = verdict.p_value < options.level
-    weighed: tuple[Weighed, ...] = ()
-    if mismatch:
-        weighed = _searched(second, track, bases, stages, options)
-    scene = scene_of(track, baseline.row)
+    weighed = held_against(explained, options) if mismatch else ()
+    scene, rng = scene_of(track, baseline.row), np.random.default_rng(third)
     found = findings_of(baseline, weighed, scene)
     residual = residual_wrench(track, baseline.row)
-    floor = noise_floor(stages.heldout) if stages.heldout is not None else (math.nan, math.nan)
+    floor = noise_floor(stages.split.told) if stages.split is not None else (math.nan, math.nan)
     named = found.effects[0].fitted if found.effects else baseline
     left = _unexplained(baseline, weighed[0].fitted if weighed else baseline)
+    known = {*named.hypothesis.effects, *IN_ANOTHER_CHANNEL}
+    shown_by_motion = [name for name in options.effects if name not in known]
     report = {
         "mismatch": mismatch,
         "p_value": verdict.p_value,
@@ -186,8 +239,16 @@ def _diagnose_object(seed: np.random.SeedSequence, track: Track, options: Diagno
         "unexplained_fraction": left,
         "unknown": mismatch and not found.effects,
         "heldout": held_out_report(baseline, named, floor),
+        "not_shown": [each.to_report() for each in could_not_show(rng, named, shown_by_motion)],
+        "unknown_description": None,
     }
-    notes = (sentence(track.object, mismatch, verdict, found), *found.notes)
+    notes = [sentence(track.object, mismatch, verdict, found), *found.notes]
+    if mismatch and not found.effects:
+        try:
+            report["unknown_description"] = describe_unknown(rng, track, residual, baseline.row).to_report()
+        except MismatchError as error:
+            notes.append(f"what is left out cannot be described: {error}")
+    push = next_experiment(rng, track, weighed, Reach(room=room)) if mismatch and len(weighed) > 1 else None
     return ObjectDiagnosis(
         mismatch,
         verdict,
@@ -199,46 +260,13 @@ def _diagnose_object(seed: np.random.SeedSequence, track: Track, options: Diagno
         left,
         residual,
         report,
-        notes,
+        tuple(notes),
+        push,
     )
-
-
-def _searched(
-    seed: np.random.SeedSequence, track: Track, bases: list[Fitted], stages: Stages, options: DiagnoseOptions
-) -> tuple[Weighed, ...]:
-    """Try single effects, then others on top of the likeliest for as long as something is still left out."""
-    seeds = seed.spawn(options.most_together)
-    tried = search_library(seeds[0], track, _grounds(bases), stages, options)
-    weighed = weigh(bases, tried, options)
-    for depth in range(1, options.most_together):
-        deepest = [each.fitted for each in weighed if len(each.effects) == depth][:GROUNDS_OF_SETS]
-        best = weighed[0]
-        enough = len(best.effects) < depth or best.fitted.noise_scale < NEAR_THE_FLOOR
-        if enough or not deepest or predictive_test(best.fitted.peak, 0).p_value >= options.level:
-            break
-        tried += search_library(seeds[depth], track, deepest, stages, options)
-        weighed = weigh(bases, tried, options)
-    return weighed
-
-
-def _grounds(bases: list[Fitted]) -> list[Fitted]:
-    """Return the baselines that effects are tried on: the simplest, the next, and others that are better than those.
-
-    The best kind alone will not do: what an effect did, a wheel with two axes may have learned to stand in for, or
-    may have kept a fit from finding the wheel at all.
-    """
-    ordered = sorted(bases, key=lambda each: len(each.hypothesis.parameters))
-    if ordered[0] is bases[0] and ordered[0].noise_scale < NEAR_THE_FLOOR:
-        return ordered[:1]
-    kept = ordered[:2]
-    for each in ordered[2:]:
-        if each.evidence > max(other.evidence for other in kept) + WORTH_A_KIND:
-            kept.append(each)
-    return kept
 
 
 def _unexplained(baseline: Fitted, repaired: Fitted) -> float:
     """Return the share of the baseline's misfit above noise that a repair leaves, 0..1."""
     count = baseline.peak.objective.observations
-    before, after = (float(each.peak.misfit[0]) / count - 1.0 for each in (baseline, repaired))
+    before, after = (float(each.peak.misfit[0].sum()) / count - 1.0 for each in (baseline, repaired))
     return float(np.clip(after / before, 0.0, 1.0)) if before > 0.0 else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -24,12 +25,14 @@ class DiagnoseOptions(BaseModel):
         baseline: kinds of body that are no mismatch: "free", "caster" (one that is locked), "wheel" (one whose friction
             has two axes), "ground" (friction of the whole body), "wheel+ground", "hinge" (a door); the best of them is
             the baseline.
+        models: files of learned or repaired models; an object that one of them is of has it for its baseline.
         level: a p-value below this is a mismatch.
         windows: lengths of the windows of the search, growing [s].
         block: length of what is held out at a time [s].
         every: one block of so many is held out.
         draws: of an effect's prior for each three of its parameters, compared with the residual wrench; a quarter of
             them where more moves than the body.
+        candidates: how many of those are held against the shortest windows.
         keep: how many of those are climbed from, for each length of window.
         iterations: of a climb, for each length of window.
         survivors: effects at most that go on to each next length of window, by evidence.
@@ -51,14 +54,16 @@ class DiagnoseOptions(BaseModel):
     objects: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     baseline: tuple[str, ...] = ("free", "caster", "wheel")
+    models: tuple[Path, ...] = ()
     level: Share = 0.05
     windows: tuple[Positive, ...] = (0.5, 1.0, 2.0)
     block: Positive = 4.0
     every: Annotated[int, Field(ge=2, le=20)] = 4
-    draws: Annotated[int, Field(ge=8, le=100_000)] = 240
-    keep: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (6, 3, 2)
-    iterations: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (3, 6, 10)
-    survivors: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (9, 4)
+    draws: Annotated[int, Field(ge=8, le=100_000)] = 180
+    candidates: Annotated[int, Field(ge=1, le=1000)] = 8
+    keep: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (2, 2, 1)
+    iterations: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (3, 5, 8)
+    survivors: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (8, 4)
     sensor_floor: Positive = 0.15
     mass_spread: Positive = 0.1
     inertia_spread: Positive = 0.1

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_mismatch.activity import activity
 from pbrl_mismatch.effects.effect import Effect, Scene
 from pbrl_mismatch.effects.registry import EFFECTS
-from pbrl_mismatch.search.library import Fitted
+from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.predictive import Verdict
 from pbrl_mismatch.search.weigh import Weighed
 
@@ -85,7 +86,7 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene) ->
         return Findings((), (), ())
     best, notes = others[0], []
     count = baseline.peak.objective.observations
-    before, after = (float(each.peak.misfit[0]) / count - 1.0 for each in (baseline, best.fitted))
+    before, after = (float(each.peak.misfit[0].sum()) / count - 1.0 for each in (baseline, best.fitted))
     scale = best.fitted.noise_scale
     reached = scale < EXPLAINED or (scale < NEAR and before > 0.0 and after < SHARE_LEFT * before)
     named = best is weighed[0] and best.probability >= NAMED and reached and not best.vetoed
@@ -114,13 +115,13 @@ def _finding(weighed: Weighed, effect: Effect, scene: Scene) -> Finding:
     parameters = parameters_of(fitted, {each.column for each in effect.parameters(scene)})
     values = {name: float(entry["mean"]) for name, entry in parameters.items()}
     where = effect.where(values, scene) if effect.where is not None else None
-    moment = values.get(effect.when) if effect.when is not None else None
+    acts = activity(fitted.peak.objective.cuts.track, fitted.row, [effect.name])[effect.name]
     return Finding(
         effect.name,
         weighed.probability,
         parameters,
         None if where is None else {"frame": where.frame, "shape": np.round(where.shape, 4).tolist()},
-        None if moment is None else [[moment, scene.start + scene.seconds]],
+        None if acts is None else [list(each) for each in acts],
         effect.direction,
         fitted,
     )

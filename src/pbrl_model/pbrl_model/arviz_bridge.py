@@ -12,6 +12,7 @@ import numpy as np
 
 from pbrl_model.arviz_import import az
 from pbrl_model.errors import ModelError
+from pbrl_model.model_file import load_model, posterior_of
 from pbrl_model.parameters import KERNEL_COLUMNS, UNITS, BodyParameters
 from pbrl_model.posterior import Posterior
 
@@ -90,13 +91,19 @@ def save_posterior(posterior: Posterior, path: Path) -> None:
 
 
 def load_posterior(path: Path) -> Posterior:
-    """Read what `save_posterior` wrote.
+    """Read what `save_posterior` wrote, or a repaired model (`model_file`) that holds nothing which is not ours.
 
     Raises:
-        ModelError: the file is missing, cut off or of another form.
+        ModelError: the file is missing, cut off or of another form, or it has an effect that is not simulated here.
     """
     if not path.is_file():
         raise ModelError(f"{path}: expected a posterior's file, got none")
+    if path.suffix == ".json":
+        model = load_model(path)
+        try:
+            return posterior_of(model)
+        except ModelError as error:
+            raise ModelError(f"{path}: {error}") from None
     try:
         data = az().from_netcdf(str(path))
     except (OSError, ValueError, KeyError, TypeError) as error:

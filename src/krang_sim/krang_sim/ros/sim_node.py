@@ -15,6 +15,7 @@ import signal
 import sys
 import threading
 import time
+from pathlib import Path
 from typing import Any
 
 import rclpy
@@ -28,7 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
 from bullet_sim.errors import SimError
-from bullet_sim.scene import load_scene
+from bullet_sim.scene import load_scene, with_model
 from krang_sim.errors import KrangError
 from krang_sim.messages import LATCHED, message_types, to_messages
 from krang_sim.robot import SIDES
@@ -60,8 +61,9 @@ class SimNode(Node):
     def __init__(self, stop: threading.Event) -> None:
         super().__init__("sim_node")
         self._stop = stop
-        scene, seed, gui = self._declare()
-        self.session = KrangSession(load_scene(scene), seed=seed, gui=gui)
+        scene, model, seed, gui = self._declare()
+        loaded = with_model(load_scene(scene), Path(model)) if model else load_scene(scene)
+        self.session = KrangSession(loaded, seed=seed, gui=gui)
         types = message_types(self.session.tagged)
         self._outputs = {
             topic: self.create_publisher(kind, topic, LATCHED_QOS if topic in LATCHED else STREAM_QOS)
@@ -75,9 +77,10 @@ class SimNode(Node):
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
 
-    def _declare(self) -> tuple[str, int, bool]:
-        """Declare every parameter; return scene, seed and gui."""
+    def _declare(self) -> tuple[str, str, int, bool]:
+        """Declare every parameter; return scene, model, seed and gui."""
         scene = declare(self, "scene", "locked_caster", "scene file, or the name of a scene of the workspace")
+        model = declare(self, "model", "", "file of a learned model: the body of its name behaves so; empty: none")
         seed = declare(self, "seed", 0, "seed of every random draw", (0, 2**31 - 1))
         gui = declare(self, "gui", False, "open Bullet's window")
         rate = "simulated seconds per second; 0: as fast as possible"
@@ -86,7 +89,7 @@ class SimNode(Node):
         lag = "at a rate other than 1: simulated seconds to run on after a command before waiting for the next"
         self._lag: float = declare(self, "command_lag", 0.02, lag, (0.0, 1.0))
         refuse_unknown(self)
-        return scene, seed, gui
+        return scene, model, seed, gui
 
     def _listen_to_commands(self) -> None:
         self.create_subscription(Twist, "/cmd_vel", self._command_base, COMMAND_QOS)

@@ -1,174 +1,79 @@
 """Is what was concealed found? Recordings from Bullet, the truth sealed, each diagnosed by a process of its own.
 
-The truth of a case stays in the memory of the process that scores it. Its SHA-256 is written down before the diagnosis
-starts, and the diagnosis is given the recording alone. Cases that are done are kept in the results' folder: a bench
-that was stopped goes on.
+The truth of a case stays in the memory of the process that scores it. Its SHA-256 is printed and written down before
+any diagnosis starts, and a diagnosis is given the recording alone. Everything that is done is kept in the results'
+folder: a bench that was stopped goes on, case by case, in each of its three pieces.
 """
 
 from __future__ import annotations
 
-import json
-import os
-import resource
-import subprocess
-import sys
+import statistics
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from matplotlib.figure import Figure
-from scipy.stats import beta, kstest
-
-from pbrl_bag import write_recording
-from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
-from pbrl_bringup.concealed.cases import Case, make
-from pbrl_bringup.concealed.draws import DRAWS
-from pbrl_bringup.concealed.scoring import Score, score
-from pbrl_bringup.errors import BringupError
-from pbrl_bringup.files import write_json
+from pbrl_bringup.benches.concealed_figures import draw_all
+from pbrl_bringup.benches.concealed_rows import rows_of
+from pbrl_bringup.benches.rows import Measured
+from pbrl_bringup.concealed.pieces import SEAL, diagnose, judge, kept_score, simulate
+from pbrl_bringup.concealed.scoring import Score
+from pbrl_bringup.concealed.sets import Trial, trials_of
+from pbrl_bringup.concealed.truth import Truth
 from pbrl_bringup.parallel import in_parallel
 from pbrl_bringup.terminal import say
 
-CLEAN, SEEDS = 100, 10
-QUICK_CLEAN, QUICK_EFFECTS = 2, ("ground_friction", "tether", "payload_change", "wrench_bias")
-FIRST_SEED = 10_000
-"""Scored seeds begin here; those below are for development."""
-PATIENCE = 900.0
-"""For one diagnosis [s]."""
 
+def measure(seed: int, quick: bool, out: Path, *, sets: Sequence[str] = (), most: int | None = None) -> Measured:
+    """Make, diagnose and score every case of some sets, all cores at work.
 
-def measure(seed: int, quick: bool, out: Path) -> Measured:
-    """Make, diagnose and score every case, in parallel."""
-    cases = cases_of(seed, quick)
-    (out / "cases").mkdir(parents=True, exist_ok=True)
-    scores = in_parallel(run_case, [(case, out / "cases" / case.name) for case in cases], "recordings")
-    confusion(scores).savefig(out / "figure.png", dpi=110)
-    return Measured(rows_of(scores), {"cases": [asdict(each) for each in scores]})
-
-
-def cases_of(seed: int, quick: bool) -> list[Case]:
-    """Return the cases of a run: clean ones, then every effect."""
-    first = FIRST_SEED * (1 + seed)
-    clean = [Case((), first + number) for number in range(QUICK_CLEAN if quick else CLEAN)]
-    names = QUICK_EFFECTS if quick else tuple(DRAWS)
-    return clean + [Case((name,), first + number) for name in names for number in range(1 if quick else SEEDS)]
-
-
-def run_case(case: Case, folder: Path) -> Score:
-    """Make one case, seal its truth, have its recording diagnosed by another process, and score what that says.
+    Args:
+        seed: which of the scored seeds; no two seeds share a recording.
+        quick: a few cases.
+        out: folder of results; what it holds of an earlier run of this seed is not done again.
+        sets: names; none: all of them, or in a quick run clean and single.
+        most: recordings an effect at most, and ten times as many clean ones; None: all.
 
     Raises:
-        BringupError: the case cannot be made, or the diagnosis fails.
+        BringupError: there is no set of such a name, or the folder's bags were made by other code.
     """
-    done = folder / "score.json"
-    if done.exists():
-        return _read(done)
-    recording, truth = make(case)
-    seal = truth.seal()
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "seal.txt").write_text(f"{seal}\n")
-    say(f"{case.name}: SHA-256 of the truth {seal}")
-    bag = folder / "bag"
-    if not bag.exists():
-        write_recording(recording, bag)
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    command = [sys.executable, "-m", "pbrl_bringup", "diagnose", str(bag), "--out", str(folder / "found")]
-    ended = subprocess.run(
-        [*command, "--workers", "1"], capture_output=True, text=True, timeout=PATIENCE, env=os.environ, check=False
-    )
-    if ended.returncode:
-        raise BringupError(f"{case.name}: expected a diagnosis, got {ended.stderr.strip().splitlines()[-1:]}")
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    report = json.loads((folder / "found" / "report.json").read_text())
-    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    result = score(case.name, truth, report, seal, spent)
-    write_json(done, {name: None if value != value else value for name, value in asdict(result).items()})
-    return result
+    folders = {trial: out / "cases" / trial.name for trial in trials_of(seed, quick, sets, most)}
+    scores = {trial: kept for trial, folder in folders.items() if (kept := kept_score(folder)) is not None}
+    left = [trial for trial in folders if trial not in scores]
+    truths, unmade = _simulated(left, folders)
+    in_parallel(diagnose, [(trial.options, folders[trial]) for trial in truths], "recordings diagnosed")
+    judged = in_parallel(judge, [(trial, truth, folders[trial]) for trial, truth in truths.items()], "diagnoses scored")
+    scores |= dict(zip(truths, judged, strict=True))
+    ordered = [scores[trial] for trial in folders if trial in scores]
+    draw_all(ordered, out)
+    details = {"not_made": unmade, "bias": bias_of(ordered), "cases": [asdict(each) for each in ordered]}
+    return Measured(rows_of(ordered), details)
 
 
-def _read(path: Path) -> Score:
-    told: dict[str, Any] = json.loads(path.read_text())
-    for name, value in told.items():
-        told[name] = tuple(value) if isinstance(value, list) else float("nan") if value is None else value
-    return Score(**told)
+def _simulated(trials: Sequence[Trial], folders: dict[Trial, Path]) -> tuple[dict[Trial, Truth], list[str]]:
+    """Make the bags, tell the seals, and keep the truths in memory; also return which trials cannot be made."""
+    made = in_parallel(simulate, [(trial, folders[trial]) for trial in trials], "recordings made")
+    truths = {trial: truth for trial, truth in zip(trials, made, strict=True) if isinstance(truth, Truth)}
+    for trial in truths:
+        say(f"{trial.name}: SHA-256 of the truth {(folders[trial] / SEAL).read_text().strip()}")
+    unmade = [why for why in made if isinstance(why, str)]
+    for why in unmade:
+        say(f"not made: {why}")
+    return truths, unmade
 
 
-def rows_of(scores: Sequence[Score]) -> list[Row]:
-    """Return the acceptance rows, shares with exact 95 % intervals."""
-    clean, hidden = [s for s in scores if not s.effects], [s for s in scores if s.effects]
-    alarms = sum(s.mismatch for s in clean)
-    gains = [s.before / s.after for s in hidden if s.first and s.after > 0.0]
-    uniform = float(kstest([s.p_value for s in clean], "uniform").pvalue) if len(clean) > 1 else float("nan")
-    strong = [s for s in hidden if s.strength > 0.5]
-    return [
-        at_most(
-            f"false alarms on {len(clean)} clean recordings at the 5 % level, share",
-            alarms / max(len(clean), 1),
-            "1",
-            0.05,
-            interval=interval(alarms, len(clean)),
-            p_of_uniform_p_values=uniform,
-        ),
-        _share("effect named first", [s.first for s in hidden], 0.90, alarm_share=_mean([s.mismatch for s in hidden])),
-        _share("effect among the first two", [s.in_two for s in hidden], 0.97),
-        _share("effect named first, the stronger half", [s.first for s in strong], 0.97),
-        at_least(
-            "held-out position error before over after, median of the cases named right",
-            float(np.median(gains)) if gains else 0.0,
-            "1",
-            5.0,
-            cases=len(gains),
-        ),
-        at_most("CPU time of a diagnosis, median", float(np.median([s.seconds for s in scores])), "s", 60.0),
-    ]
-
-
-def _mean(values: Sequence[bool]) -> float:
-    return float(np.mean(values)) if values else float("nan")
-
-
-def _share(what: str, told: Sequence[bool], goal: float, **against: Any) -> Row:
-    return at_least(
-        f"{what}, share of {len(told)} recordings",
-        _mean(told) if told else 0.0,
-        "1",
-        goal,
-        interval=interval(sum(told), len(told)),
-        **against,
-    )
-
-
-def interval(hits: int, count: int, level: float = 0.95) -> str:
-    """Return the exact (Clopper-Pearson) interval of a share."""
-    if count == 0:
-        return "0 to 1"
-    tail = (1.0 - level) / 2.0
-    low = 0.0 if hits == 0 else float(beta.ppf(tail, hits, count - hits + 1))
-    high = 1.0 if hits == count else float(beta.ppf(1.0 - tail, hits + 1, count - hits))
-    return f"{low:.3f} to {high:.3f}"
-
-
-def confusion(scores: Sequence[Score]) -> Figure:
-    """Draw what was concealed against what was named first."""
-    rows = list(dict.fromkeys("+".join(s.effects) or "nothing" for s in scores))
-    columns = [*dict.fromkeys([*DRAWS, *(name for s in scores for name in s.named[:1])]), "unknown", "nothing"]
-    counts = np.zeros((len(rows), len(columns)))
+def bias_of(scores: Sequence[Score]) -> dict[str, dict[str, Any]]:
+    """Return medians of how far parameters of effects that were named right are off, and how often by under two sd."""
+    found: dict[str, list[tuple[float, float]]] = {}
     for each in scores:
-        said = "nothing" if not each.mismatch else each.named[0] if each.named else "unknown"
-        counts[rows.index("+".join(each.effects) or "nothing"), columns.index(said)] += 1
-    shares = counts / counts.sum(axis=1, keepdims=True)
-    page = Figure(figsize=(2.6 + 0.36 * len(columns), 2.4 + 0.3 * len(rows)), layout="constrained")
-    axes = page.subplots()
-    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
-    for (row, column), count in np.ndenumerate(counts):
-        if count:
-            colour = "white" if shares[row, column] > 0.5 else "black"
-            axes.text(column, row, f"{count:.0f}", ha="center", va="center", fontsize=8, color=colour)
-    axes.set_xticks(range(len(columns)), columns, rotation=60, ha="right", fontsize=8)
-    axes.set_yticks(range(len(rows)), rows, fontsize=8)
-    axes.set_xlabel("named first")
-    axes.set_ylabel("concealed")
-    axes.set_title("What was concealed, and what the diagnosis named (recordings)", fontsize=10)
-    return page
+        for name, off in each.bias.items():
+            found.setdefault(name, []).append(off)
+    return {
+        name: {
+            "relative": statistics.median(abs(relative) for relative, _ in values),
+            "sds": statistics.median(abs(sds) for _, sds in values),
+            "within_two_sd": statistics.fmean(abs(sds) < 2.0 for _, sds in values),
+            "recordings": len(values),
+        }
+        for name, values in sorted(found.items())
+    }

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from pbrl_bringup.commands.measured import run_measured
+from pbrl_bringup.errors import BringupError
 
 BENCHES = {
     "sim": "a pushed table against a hand calculation, kinematics, speed",
@@ -17,13 +19,34 @@ BENCHES = {
     "pose": "a wheel's place from pushes of random tables",
     "calibration": "ranks of the truth among posterior draws, over the prior",
     "concealed": "recordings with one thing concealed: is it noticed, named, and does the repair predict",
+    "next-experiment": "pushes until it is known what was left out, chosen by information or at random",
+    "mismatch": "the watch over a stream: half an hour of clean pushing without an alarm, and how late alarms are",
 }
 
+WITH_SETS = ("concealed",)
+"""Benches whose cases come in sets."""
 
-def command(name: str, out: Path | None, seed: int, quick: bool) -> int:
+
+def command(name: str, out: Path | None, seed: int, quick: bool, sets: list[str], most: int | None) -> int:
     """Run one bench.
 
+    Args:
+        name: of the bench.
+        out: folder of the report; None: out/bench/NAME.
+        seed: of every random draw.
+        quick: whether to do a smaller version.
+        sets: which sets of cases, for a bench that has some; none: all.
+        most: recordings an effect at most, for a bench that has sets; None: all.
+
     Raises:
-        BringupError: there is none of that name.
+        BringupError: there is no bench of that name, it has no sets, or none of such a name.
     """
-    return run_measured("bench", BENCHES, name, out, seed, quick)
+    if sets and name in BENCHES and name not in WITH_SETS:
+        raise BringupError(f"bench {name}: expected no --sets, got {', '.join(sets)}; {', '.join(WITH_SETS)} has some")
+    if most is not None and name in BENCHES and name not in WITH_SETS:
+        raise BringupError(
+            f"bench {name}: expected no --most, got {most}; {', '.join(WITH_SETS)} has recordings to count"
+        )
+    more: dict[str, Any] = {"sets": sets} if sets else {}
+    more |= {} if most is None else {"most": most}
+    return run_measured("bench", BENCHES, name, out, seed, quick, more)

@@ -10,17 +10,26 @@ from typing import Any
 from rich.console import Console
 
 from pbrl_bag import read_recording
+from pbrl_bringup.diagnosis.models import write_models
 from pbrl_bringup.diagnosis.page import write_diagnosis
 from pbrl_bringup.files import result_folder, write_json
 from pbrl_bringup.terminal import output, say, table
 from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis, diagnose
 from pbrl_mismatch.options import DiagnoseOptions
+from pbrl_mismatch.search.told_baseline import is_model_file
 
 SHOWN = 5
 
 
 def command(
-    bag: Path, mapping: Path | None, out: Path, baseline: list[str], without: list[str], seed: int, workers: int
+    bag: Path,
+    mapping: Path | None,
+    out: Path,
+    baseline: list[str],
+    without: list[str],
+    mass_spread: float | None,
+    seed: int,
+    workers: int,
 ) -> int:
     """Diagnose every object of a recording.
 
@@ -30,7 +39,10 @@ def command(
         MismatchError: an option does not fit.
         BringupError: the results cannot be written.
     """
-    asked: dict[str, Any] = {"baseline": tuple(baseline)} if baseline else {}
+    kinds = tuple(each for each in baseline if not is_model_file(each))
+    asked: dict[str, Any] = {"baseline": kinds} if kinds else {}
+    asked["models"] = tuple(Path(each) for each in baseline if is_model_file(each))
+    asked |= {} if mass_spread is None else {"mass_spread": mass_spread}
     options = DiagnoseOptions(without=tuple(without), seed=seed, workers=workers, **asked)
     recording = read_recording(bag, mapping)
     for note in recording.notes:
@@ -39,7 +51,9 @@ def command(
         with Console(stderr=True).status(f"diagnosing (baseline {', '.join(options.baseline)}, seed {seed})"):
             found = diagnose(recording, options)
         write_json(folder / "report.json", found.to_report())
-        write_diagnosis(found, recording, "./pbrl " + shlex.join(sys.argv[1:]), folder / "report.html")
+        models = write_models(found, folder, seed)
+        asked_for = "./pbrl " + shlex.join(sys.argv[1:])
+        write_diagnosis(found, recording, asked_for, folder / "report.html", options=options, models=models)
     print_diagnosis(found)
     output().print(f"[bold]{out / 'report.html'}[/]")
     return 0

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from pbrl_bringup.benches.rows import last_line, report
 from pbrl_bringup.errors import BringupError
@@ -13,7 +15,15 @@ from pbrl_bringup.files import output_folder
 from pbrl_bringup.terminal import output, say, table
 
 
-def run_measured(kind: str, known: Mapping[str, str], name: str, out: Path | None, seed: int, quick: bool) -> int:
+def run_measured(
+    kind: str,
+    known: Mapping[str, str],
+    name: str,
+    out: Path | None,
+    seed: int,
+    quick: bool,
+    more: Mapping[str, Any] | None = None,
+) -> int:
     """Run the module `pbrl_bringup.<kind>s.<name>`.
 
     Args:
@@ -23,6 +33,7 @@ def run_measured(kind: str, known: Mapping[str, str], name: str, out: Path | Non
         out: folder of the report; None: out/<kind>/<name>.
         seed: of every random draw.
         quick: whether to do a smaller version.
+        more: what only this one can be asked, by name.
 
     Raises:
         BringupError: there is none of that name.
@@ -35,7 +46,7 @@ def run_measured(kind: str, known: Mapping[str, str], name: str, out: Path | Non
     output_folder(folder)
     say(f"pbrl: {kind} {name}: {known[name]}; seed {seed}, results in {folder}")
     module = import_module(f"pbrl_bringup.{PACKAGES[kind]}.{name.replace('-', '_')}")
-    summary = report(name, seed, module.measure, quick, folder)
+    summary = report(name, seed, partial(module.measure, **(more or {})), quick, folder)
     rows = [
         (row["what"], _value(row["value"]), row["unit"], row["goal"], _mark(row["holds"])) for row in summary["rows"]
     ]

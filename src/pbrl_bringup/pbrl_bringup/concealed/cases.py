@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +12,10 @@ from bullet_sim.errors import SimError
 from bullet_sim.hand_recording import Activity, HandRecording
 from pbrl_bag.types import Recording
 from pbrl_bringup.concealed.draws import DRAWS
+from pbrl_bringup.concealed.oracle import seen
 from pbrl_bringup.concealed.recording import to_recording
-from pbrl_bringup.concealed.stage import NAME, Stage, draw_stage, play
+from pbrl_bringup.concealed.stage import NAME, Stage, draw_stage, play, saturated
+from pbrl_bringup.concealed.told import told_values
 from pbrl_bringup.concealed.truth import Truth
 from pbrl_bringup.errors import BringupError
 
@@ -20,6 +23,8 @@ TRIES = 8
 """Draws of an effect before a case counts as one that cannot be made."""
 LEAST_SHARE = 0.02
 """Of the time in which the table moves: an effect that acts for less is drawn again."""
+FIRST_POSES = 5
+"""Poses of the gripper from which its turn against the body is taken."""
 PLACES = {"floor_patch": "polygon", "hidden_obstacle": "polygon", "second_wheel": "position", "hidden_hinge": "point"}
 """Settings that say where an effect is."""
 
@@ -42,17 +47,22 @@ class Case:
         return f"{'+'.join(self.effects) or 'clean'}-{self.seed}"
 
 
-def make(case: Case) -> tuple[Recording, Truth]:
+def make(case: Case, draw: Callable[[np.random.Generator], Stage] = draw_stage) -> tuple[Recording, Truth]:
     """Simulate a case; the same case makes the same recording.
+
+    Args:
+        case: what to conceal.
+        draw: of the stage.
 
     Raises:
         BringupError: no draw of the effects leads to a recording in which they act.
     """
     rng = np.random.default_rng([case.seed, *(sum(map(ord, name)) for name in case.effects)])
-    stage = draw_stage(rng)
+    stage = draw(rng)
     why = ""
+    least = 0.0
     for _ in range(TRIES):
-        strength = float(rng.random())
+        strength = float(rng.uniform(least, 1.0))
         concealed: dict[str, Any] = {}
         for effect in case.effects:
             concealed |= DRAWS[effect](rng, stage, strength)
@@ -62,8 +72,12 @@ def make(case: Case) -> tuple[Recording, Truth]:
             why = str(error).splitlines()[-1]
             continue
         truth = _truth(case, stage, concealed, made, strength)
-        if made.status == "done" and all(share >= LEAST_SHARE for share in truth.share.values()):
-            return to_recording(made, stage.with_concealed(concealed)), truth
+        if made.status == "done" and not saturated(made) and min(truth.share.values(), default=1.0) >= LEAST_SHARE:
+            recording = to_recording(made, stage.with_concealed(concealed))
+            if not case.effects or seen(recording, truth):
+                return recording, truth
+            why, least = "an effect too weak for an oracle that is told", strength
+            continue
         why = made.status if made.status != "done" else f"acting shares {truth.share}"
     raise BringupError(f"{case.name}: expected one of {TRIES} draws to act and to be done, got {why} in the last")
 
@@ -79,7 +93,18 @@ def _truth(case: Case, stage: Stage, concealed: dict[str, Any], made: HandRecord
         when[effect] = [(float(start), float(end)) for start, end in joined.intervals()]
         share[effect] = float(acting[moving].mean()) if moving.any() else 0.0
         place[effect] = _place(effect, concealed[effect])
-    return Truth(case.effects, NAME, concealed, when, place, strength, share)
+    told = told_values(concealed, stage.with_concealed(concealed), grip_turn(made))
+    return Truth(case.effects, NAME, concealed, when, place, strength, share, told)
+
+
+def grip_turn(made: HandRecording) -> float:
+    """Return the turn of the wrist sensor's axes against the body's when it was first held [rad]."""
+    tag, track = made.tags[f"{made.side}_gripper"], made.bodies[NAME]
+    began = next(change.time for change in made.grasps if change.body is not None)
+    early = np.flatnonzero(tag.time >= began)[:FIRST_POSES]
+    turn = 2.0 * np.arctan2(tag.quaternion[early, 2], tag.quaternion[early, 3])
+    off = turn - np.interp(tag.time[early], track.time, track.pose[:, 2])
+    return float(np.angle(np.mean(np.exp(1j * off))))
 
 
 def _place(effect: str, settings: Any) -> list[tuple[float, float]]:

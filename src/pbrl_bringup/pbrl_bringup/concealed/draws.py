@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from pbrl_bringup.concealed.stage import NAME, Stage
+from pbrl_bringup.concealed.stage import NAME, Stage, draw_wheel
 
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, Stage, float], dict[str, object]]
 
 GRAVITY = 9.81
+DRIFTING = 10.0
+"""A drift is as large as a step after so long [s]."""
 FREE = 0.02
 """Between a hidden body and the table as it stands at the start [m]."""
 
@@ -61,7 +63,12 @@ def second_wheel(rng: np.random.Generator, stage: Stage, strength: float) -> dic
     place = (rng.uniform(-0.85, 0.85, 2) * stage.half).tolist()
     load = between(0.03, 0.35, strength) * stage.mass * GRAVITY
     told = {"position": place, "heading": float(rng.uniform(-1.5, 1.5)), "load": max(load, 5.0)}
-    return {"second_wheel": {NAME: {**told, "locked": bool(rng.random() < 0.4)}}}
+    second: dict[str, object] = {"second_wheel": {NAME: {**told, "locked": bool(rng.random() < 0.4)}}}
+    known: dict[str, object] = stage.scene["concealed"]  # type: ignore[assignment]
+    if "wheel" in known:
+        return second
+    # A table of the baseline class may have one wheel: a lone one is nothing that was left out.
+    return {**second, "wheel": {NAME: draw_wheel(rng, stage.half, stage.mass)}}
 
 
 def com_offset(rng: np.random.Generator, stage: Stage, strength: float) -> dict[str, object]:
@@ -164,19 +171,24 @@ def grasp_compliance(rng: np.random.Generator, stage: Stage, strength: float) ->
 
 
 def wrench_bias(rng: np.random.Generator, stage: Stage, strength: float) -> dict[str, object]:
-    """Draw an offset that comes after the sensor was read at rest."""
+    """Draw an offset that comes after the sensor was read at rest, at once or little by little."""
     angle, size = rng.uniform(-math.pi, math.pi), between(0.8, 8.0, strength)
     force = [size * math.cos(angle), size * math.sin(angle), 0.0]
     torque = [0.0, 0.0, float(rng.normal() * 0.1 * size)]
-    return {"wrench_bias": {"left": {"force": force, "torque": torque, "start": _first(stage), "rise": 0.5}}}
+    if rng.random() < 0.5:
+        start = _moment(rng, stage, 0.02, 0.6)
+        return {"wrench_bias": {"left": {"force": force, "torque": torque, "start": start, "rise": 0.3}}}
+    drift, turn = [part / DRIFTING for part in force], [part / DRIFTING for part in torque]
+    return {"wrench_bias": {"left": {"force_drift": drift, "torque_drift": turn, "start": _first(stage)}}}
 
 
 def wrench_frame(rng: np.random.Generator, stage: Stage, strength: float) -> dict[str, object]:
-    """Draw a sensor that is turned or scaled."""
-    turn = [0.0, 0.0, 0.0]
-    turn[int(rng.integers(3))] = float(rng.choice([-1, 1])) * between(0.08, 0.5, strength)
-    scale = between(1.06, 1.5, strength)
-    return {"wrench_frame": {"left": {"scale": scale if rng.random() < 0.5 else 1.0 / scale, "turn": turn}}}
+    """Draw a sensor that is turned about its axis, scaled, or both."""
+    kind = int(rng.integers(3))
+    turn = float(rng.choice([-1, 1])) * between(0.08, 0.5, strength) if kind != 1 else 0.0
+    scale = between(1.15, 1.8, strength) if kind != 0 else 1.0
+    scale = scale if rng.random() < 0.5 else 1.0 / scale
+    return {"wrench_frame": {"left": {"scale": scale, "turn": [0.0, 0.0, turn]}}}
 
 
 def time_offset(rng: np.random.Generator, stage: Stage, strength: float) -> dict[str, object]:

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from bullet_sim.errors import SimError
 from bullet_sim.hand_push import push_by_hand
 from bullet_sim.hand_recording import BodyTrack, HandPath, HandPush, HandRecording
-from bullet_sim.scene import Scene
+from bullet_sim.scene import Scene, WristSettings
 from pbrl_bringup.errors import BringupError
 
 Array = NDArray[np.float64]
 
 NAME = "table"
-SECONDS, PUSHES = 14.0, 2
+SECONDS, PUSHES = 16.0, 3
 """Of one push, and how many there are."""
 KNOT = 0.1
 """Between knots of a path [s]."""
@@ -31,6 +31,8 @@ ROOM = 6.0
 """Half the extent of the room [m]."""
 FASTEST, SPINNING, SLIPPED = 0.4, 0.6, 0.008
 """Of a push that counts: speed of the table [m/s], its turning [rad/s], way of its edge in the hand [m]."""
+RANGE = 0.95
+"""Of a wrist sensor that may be used: at its end it shows less than there is."""
 TRIES = 24
 """Pushes that are drawn before a table counts as one that cannot be pushed."""
 
@@ -92,26 +94,37 @@ def draw_stage(rng: np.random.Generator) -> Stage:
     half = np.array(table["size"], dtype=float) / 2.0
     why = ""
     for number in range(TRIES):
-        pushes = tuple(_push(rng, half, gentle=0.85**number) for _ in range(PUSHES))
+        pushes = tuple(draw_push(rng, half, gentle=0.85**number) for _ in range(PUSHES))
         seed = int(rng.integers(2**31))
         try:
             found = push_by_hand(Scene.model_validate(scene), pushes, seed=seed)
         except SimError as error:  # a table without friction may have rolled on until the hand came back
             why = str(error)
             continue
-        why = found.status if found.status != "done" else _violence(found)
+        why = found.status if found.status != "done" else violence(found)
         if not why:
             return Stage(scene, pushes, seed, found.bodies[NAME])
     raise BringupError(f"concealed: expected one of {TRIES} drawn pushes to succeed, got {why!r} in the last")
 
 
-def _violence(found: HandRecording) -> str:
+def violence(found: HandRecording) -> str:
     """Say what no careful robot would let happen, or nothing: a table that swings, an edge that slides in the hand."""
     twist = found.bodies[NAME].twist
     speed, spin = float(np.hypot(*twist[:, :2].T).max()), float(np.abs(twist[:, 2]).max())
     if speed > FASTEST or spin > SPINNING:
         return f"the table swings, {speed:.2f} m/s and {spin:.2f} rad/s"
-    return f"it slips by {1000.0 * found.slipped:.0f} mm in the hand" if found.slipped > SLIPPED else ""
+    if found.slipped > SLIPPED:
+        return f"it slips by {1000.0 * found.slipped:.0f} mm in the hand"
+    return "the wrist sensor is at its end" if saturated(found) else ""
+
+
+def saturated(found: HandRecording) -> bool:
+    """Tell whether a wrist sensor came near the end of its range, where a force or a torque is more than it shows."""
+    sensor = WristSettings()
+    force, torque = np.abs(found.wrench.force), np.abs(found.wrench.torque)
+    return bool(
+        np.any(force > RANGE * np.array(sensor.force_range)) or np.any(torque > RANGE * np.array(sensor.torque_range))
+    )
 
 
 def play(stage: Stage, concealed: dict[str, object]) -> HandRecording:
@@ -124,9 +137,7 @@ def _scene(rng: np.random.Generator) -> dict[str, object]:
     concealed: dict[str, object] = {}
     mass = float(rng.uniform(16.0, 40.0))
     if rng.random() < WHEEL_SHARE:
-        place = (rng.uniform(-0.8, 0.8, 2) * np.array(size) / 2.0).tolist()
-        load = float(rng.uniform(0.2, 0.4) * mass * 9.81)
-        concealed["wheel"] = {NAME: {"position": place, "heading": float(rng.uniform(-1.5, 1.5)), "load": load}}
+        concealed["wheel"] = {NAME: draw_wheel(rng, np.array(size) / 2.0, mass)}
     outline = [[-ROOM, -ROOM], [ROOM, -ROOM], [ROOM, ROOM], [-ROOM, ROOM]]
     table = {
         "kind": "plain_table",
@@ -137,7 +148,20 @@ def _scene(rng: np.random.Generator) -> dict[str, object]:
     return {"name": "concealed", "room": {"outline": outline}, "bodies": {NAME: table}, "concealed": concealed}
 
 
-def _push(rng: np.random.Generator, half: Array, gentle: float) -> HandPush:
+def draw_wheel(rng: np.random.Generator, half: Array, mass: float) -> dict[str, object]:
+    """Draw the one wheel that a table of the baseline class may have.
+
+    Args:
+        rng: source of randomness.
+        half: (2,) half the table's extent [m].
+        mass: of the table [kg].
+    """
+    place = (rng.uniform(-0.8, 0.8, 2) * half).tolist()
+    load = float(rng.uniform(0.2, 0.4) * mass * 9.81)
+    return {"position": place, "heading": float(rng.uniform(-1.5, 1.5)), "load": load}
+
+
+def draw_push(rng: np.random.Generator, half: Array, gentle: float) -> HandPush:
     """Draw a grasp of an edge and a path: forth and back with changing speed, swaying and turning a little."""
     side, along = rng.integers(4), rng.uniform(-0.7, 0.7)
     contact = ((along * half[0], half[1]), (-half[0], along * half[1]), (along * half[0], -half[1]), (half[0], 0.0))

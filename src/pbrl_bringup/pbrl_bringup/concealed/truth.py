@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,7 @@ class Truth:
         place: corners or points (x, y) of an effect that has one, in `world` [m], by name.
         strength: where between barely and strongly the effect was drawn, 0 to 1.
         share: of the time in which the object moved that an effect acted, by name.
+        told: what the oracle is told, in columns of the effects library.
     """
 
     effects: tuple[str, ...]
@@ -28,6 +29,7 @@ class Truth:
     place: dict[str, list[tuple[float, float]]]
     strength: float
     share: dict[str, float]
+    told: dict[str, float] = field(default_factory=dict)
 
     @property
     def active(self) -> bool:

@@ -25,7 +25,9 @@ EVERY, OUTLINE_EVERY = 0.3, 2.0
 SURE = 6.0
 """Standard deviations at which an arrow's colour is full."""
 SHOWN = 8
-BLUE, ORANGE, GREY = "#0067a8", "#c45500", "#8a9096"
+BLUE, ORANGE, GREY, PURPLE = "#0067a8", "#c45500", "#8a9096", "#a3377a"
+ON_THE_FLOOR = ("world", "floor")
+"""Frames of places that stay where they are."""
 
 
 def floor(body: BodyGeometry, found: ObjectDiagnosis) -> str:
@@ -40,7 +42,7 @@ def floor(body: BodyGeometry, found: ObjectDiagnosis) -> str:
         axes.plot(*residual.state[episode, :2].T, color="black", lw=1.0)
     _arrows(axes, residual)
     for entry in found.report["effects"]:
-        _where(axes, entry)
+        _where(axes, entry, residual.state[-1, :3])
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
@@ -71,23 +73,27 @@ def _arrows(axes: Axes, residual: ResidualWrench) -> None:
     bar.set_label("standard deviations from nothing")
 
 
-def _where(axes: Axes, entry: Mapping[str, Any]) -> None:
-    """Mark where an effect is, if it has a place in the room."""
+def _where(axes: Axes, entry: Mapping[str, Any], last: Array) -> None:
+    """Mark where an effect is: on the floor, or on the object at its last pose (3,)."""
     where = entry.get("where")
-    if not where or where.get("frame") != "world" or not where.get("shape"):
+    if not where or not where.get("shape"):
         return
     shape = np.array(where["shape"], dtype=float).reshape(-1, 2)
+    shape = shape if where["frame"] in ON_THE_FLOOR else _placed(shape, last)
     if len(shape) > 2:
-        axes.fill(*shape.T, facecolor=BLUE, alpha=0.15, edgecolor=BLUE, lw=1.5)
+        axes.fill(*shape.T, facecolor=PURPLE, alpha=0.2, edgecolor=PURPLE, lw=1.5, zorder=4)
     else:
-        axes.plot(*shape.T, "P", color=BLUE, ms=10)
-    axes.annotate(entry["effect"], shape.mean(axis=0), color=BLUE, fontsize=9, ha="center")
+        axes.plot(*shape.T, "P", color=PURPLE, ms=10, zorder=4)
+    top = shape[np.argmax(shape[:, 1])]
+    axes.annotate(
+        entry["effect"], top, xytext=(0, 4), textcoords="offset points", color=PURPLE, fontsize=10, ha="center"
+    )
 
 
 def over_time(found: ObjectDiagnosis) -> str:
     """Draw the left-out wrench over time with two standard deviations, and when effects begin and end."""
     residual = found.residual
-    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
+    figure = Figure(figsize=(11.0, 5.0), layout="constrained")
     rows = figure.subplots(3, 1, sharex=True)
     time = residual.time - residual.time[0]
     spread = 2.0 * np.sqrt(np.einsum("tii->ti", residual.covariance))
@@ -102,42 +108,48 @@ def over_time(found: ObjectDiagnosis) -> str:
         axes.set_ylabel(name, fontsize=8)
         for entry in found.report["effects"]:
             for start, end in entry["when"] or []:
-                axes.axvspan(start - residual.time[0], end - residual.time[0], color=BLUE, alpha=0.12, lw=0)
-    rows[-1].set_xlabel("seconds since the first grasp; shaded blue: when what is named acts")
+                axes.axvspan(start - residual.time[0], end - residual.time[0], color=PURPLE, alpha=0.12, lw=0)
+    acts = any(entry["when"] for entry in found.report["effects"])
+    shaded = "; shaded: when what is named acts" if acts else ""
+    rows[-1].set_xlabel(f"seconds since the first grasp{shaded}")
     return _svg(figure)
 
 
 def odds(found: ObjectDiagnosis) -> str:
     """Draw the probabilities of the likeliest hypotheses."""
     shown = found.hypotheses[:SHOWN][::-1]
-    figure, axes = _canvas(7.2, 0.9 + 0.34 * max(len(shown), 1))
+    figure, axes = _canvas(4.4, 0.8 + 0.34 * max(len(shown), 1))
     names = [" + ".join(each.effects) or "nothing was left out" for each in shown]
     best = max((each.log_weight for each in shown), default=0.0)
     axes.barh(names, [each.probability for each in shown], color=BLUE)
     for row, each in enumerate(shown):
-        behind = "" if each.log_weight == best else f"  behind by {best - each.log_weight:.0f} nats"
+        behind = "" if each.log_weight == best else f"  {best - each.log_weight:.0f} nats behind"
         axes.text(each.probability, row, f" {each.probability:.3f}{behind}", va="center", fontsize=8)
-    axes.set_xlim(0.0, 1.35)
-    axes.set_xlabel("probability among what was tried")
+    axes.set_xlim(0.0, 1.45)
+    axes.set_xticks([0.0, 0.5, 1.0])
+    axes.set_xlabel("probability", fontsize=9)
     return _svg(figure)
 
 
 def held_out(found: ObjectDiagnosis) -> str:
     """Draw errors of the baseline and of the repair on what was held out, beside the noise."""
-    figure = Figure(figsize=(7.2, 2.2), layout="constrained")
+    figure = Figure(figsize=(4.4, 1.9), layout="constrained")
     columns = figure.subplots(1, 2)
     kinds = (("rmse_position_m", "position [mm]", 1000.0), ("rmse_yaw_rad", "heading [degrees]", 180.0 / math.pi))
     for axes, (name, label, factor) in zip(columns, kinds, strict=True):
         axes.spines[["top", "right"]].set_visible(False)
         told = found.report["heldout"][name]
-        values = [told["baseline"], told["repaired"], told["noise_floor"]]
-        known = [math.nan if value is None else factor * value for value in values]
-        axes.barh(["noise", "repaired", "before"], known[::-1], color=[GREY, BLUE, ORANGE])
-        for row, value in enumerate(known[::-1]):
+        bars = {"noise": (told["noise_floor"], GREY), "model": (told["baseline"], ORANGE)}
+        if found.repaired is not found.baseline:
+            bars = {"noise": bars["noise"], "repaired": (told["repaired"], BLUE), "before": bars["model"]}
+        known = [math.nan if value is None else factor * value for value, _ in bars.values()]
+        axes.barh(list(bars), known, color=[colour for _, colour in bars.values()])
+        for row, value in enumerate(known):
             if math.isfinite(value):
                 axes.text(value, row, f" {value:.2g}", va="center", fontsize=8)
-        axes.set_xlabel(f"held-out error, {label}")
-        axes.margins(x=0.15)
+        axes.set_xlabel(label, fontsize=9)
+        axes.margins(x=0.25)
+        axes.locator_params(axis="x", nbins=4)
     return _svg(figure)
 
 

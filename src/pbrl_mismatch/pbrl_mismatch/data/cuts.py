@@ -11,6 +11,9 @@ from pbrl_mismatch.data.track import Track
 from pbrl_model.sensing.windows import POSE_RATE, Windows, shooting_windows
 
 Array = NDArray[np.float64]
+
+KNOCKED = 4.0
+"""The start of a grasp is so much less known than smoothing says."""
 Index = NDArray[np.int64]
 
 
@@ -85,6 +88,8 @@ def cut_windows(track: Track, length: float, *, rate: float = POSE_RATE) -> Cuts
     first = np.round((windows.start - starts[episode]) / track.dt).astype(np.int64) + track.begin[episode]
     span = np.stack([first, windows.steps, track.begin[episode], track.last[episode]], -1)
     values, vectors = np.linalg.eigh(windows.covariance)
+    # Plates that close on a body which is not at rest stop it by a knock: smoothed poses do not know its speed then.
+    scale = np.where(span[:, 0] == span[:, 2], KNOCKED, 1.0)
     seen = windows.seen.any(axis=2)
     place = np.where(seen, windows.step + windows.fraction, windows.steps[:, None].astype(float))
     return Cuts(
@@ -93,7 +98,7 @@ def cut_windows(track: Track, length: float, *, rate: float = POSE_RATE) -> Cuts
         track.pivot[episode],
         place,
         windows.initial,
-        vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :],
+        scale[:, None, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :],
         windows.pose,
         _weights(windows),
         windows.start,

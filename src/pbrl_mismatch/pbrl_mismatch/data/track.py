@@ -8,7 +8,7 @@ last step is undone, so that the kernel can do it again under every hypothesis.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from pbrl_model.sensing.motion import MARGIN, Motion
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+CLOSING, ROLLING = 1.0, 0.02
+"""The first moments of a grasp [s] are left out where plates close on a body that moves faster than this [m/s]: they
+stop it by a knock that is over before poses can tell."""
 FEET_SHARE = 0.85
 """Where no casters are told, a body stands on the corners of its bounding box, shrunk by this."""
 
@@ -81,6 +84,23 @@ class Track:
         return float(np.sqrt(self.body[0]))
 
 
+def after_closing(motion: Motion) -> Motion:
+    """Return an episode without its first moments if the body was not at rest, and it is long enough to spare them."""
+    first = round(CLOSING / motion.dt)
+    if float(np.hypot(*motion.state[0, 3:5])) < ROLLING or len(motion.wrench) < 5 * first:
+        return motion
+    kept = motion.pose_time >= motion.time[first]
+    return replace(
+        motion,
+        time=motion.time[first:],
+        wrench=motion.wrench[first:],
+        pose_time=motion.pose_time[kept],
+        pose=motion.pose[kept],
+        state=motion.state[first:],
+        covariance=motion.covariance[first:],
+    )
+
+
 def lay_track(
     recording: Recording, motions: Sequence[Motion], geometry: BodyGeometry, properties: MassProperties
 ) -> Track:
@@ -100,7 +120,8 @@ def lay_track(
     dt = motions[0].dt
     if any(motion.dt != dt for motion in motions):
         raise MismatchError(f"track: expected episodes on one grid step, got {sorted({m.dt for m in motions})} s")
-    parts = [_sensed(recording, motion, properties.com) for motion in motions]
+    first: dict[str, tuple[Array, float]] = {}
+    parts = [_sensed(recording, motion, properties.com, first) for motion in motions]
     lengths = np.array([len(motion.wrench) for motion in motions])
     begin = np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int64)
     seen = np.concatenate([motion.state[:-1] for motion in motions])
@@ -136,7 +157,9 @@ def _origin(state: Array, com: Array) -> Array:
     return np.array([state[0] - c * com[0] + s * com[1], state[1] - s * com[0] - c * com[1], state[2]])
 
 
-def _sensed(recording: Recording, motion: Motion, com: Array) -> tuple[Array, Array]:
+def _sensed(
+    recording: Recording, motion: Motion, com: Array, first: dict[str, tuple[Array, float]]
+) -> tuple[Array, Array]:
     """Return the wrench in the sensor's axes (T, 3) and how the sensor was mounted (T, 4).
 
     With two grippers there is one sensor in this model, half-way between the two: what acts on the body is the same,
@@ -146,7 +169,7 @@ def _sensed(recording: Recording, motion: Motion, com: Array) -> tuple[Array, Ar
     centre = 0.5 * (motion.state[1:] + motion.state[:-1])
     turns, places = [], []
     for gripper in motion.grippers:
-        turn, place = _mounted(recording, motion, gripper, middle, centre, com)
+        turn, place = _mounted(recording, motion, gripper, middle, centre, com, first)
         turns.append(turn)
         places.append(place)
     turn, arm = np.mean(turns, axis=0), np.mean(places, axis=0) - centre[:, :2]
@@ -157,17 +180,28 @@ def _sensed(recording: Recording, motion: Motion, com: Array) -> tuple[Array, Ar
 
 
 def _mounted(
-    recording: Recording, motion: Motion, gripper: str, middle: Array, centre: Array, com: Array
+    recording: Recording,
+    motion: Motion,
+    gripper: str,
+    middle: Array,
+    centre: Array,
+    com: Array,
+    first: dict[str, tuple[Array, float]],
 ) -> tuple[Array, Array]:
-    """Return turn (T,) [rad] and place (T, 2) [m] of one gripper's sensor; turned as the body is at the start."""
+    """Return turn (T,) [rad] and place (T, 2) [m] of one gripper's sensor.
+
+    Its axes are those of the body when this gripper first held on; in later grasps they are turned as the gripper is
+    against then, so that a fault of the sensor is the same in all. `first` keeps its rotation (3, 3), and that turn.
+    """
     stream, pose = recording.wrenches[gripper], recording.gripper_poses.get(gripper)
     if pose is not None and stream.frame != "world":
         keep = (pose.time >= motion.time[0] - MARGIN) & (pose.time <= motion.time[-1] + MARGIN)
         cut = type(pose)(pose.time[keep], pose.position[keep], pose.quaternion[keep])
         rotation, position = smooth_gripper(cut, middle)
-        relative = rotation @ rotation[0].T
+        began, turned = first.setdefault(gripper, (rotation[0], float(centre[0, 2])))
+        relative = rotation @ began.T
         yaw = np.unwrap(np.arctan2(relative[:, 1, 0] - relative[:, 0, 1], relative[:, 0, 0] + relative[:, 1, 1]))
-        return yaw + centre[0, 2], position[:, :2]
+        return yaw + turned, position[:, :2]
     c, s = np.cos(centre[:, 2]), np.sin(centre[:, 2])
     held = [g for g in recording.grasps if g.gripper == gripper and g.object == motion.object]
     contact = min(held, key=lambda g: abs(g.start - motion.time[0])).contact - com

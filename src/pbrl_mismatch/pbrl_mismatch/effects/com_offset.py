@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain, positive
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -10,6 +10,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
     return (
         plain("com_x", 0.0, 0.25 * float(scene.half[0])),
         plain("com_y", 0.0, 0.25 * float(scene.half[1])),
+        positive("inertia_factor", 1.0, 0.25),
     )
 
 
@@ -31,6 +32,7 @@ EFFECT = Effect(
         (
             "com_x",
             "com_y",
+            "inertia_factor",
         ),
     ),
     where=where,

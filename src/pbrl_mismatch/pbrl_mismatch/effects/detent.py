@@ -11,7 +11,9 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         positive("detent_force", 0.7 * scene.force, 1.0),
         plain("detent_x", float(scene.middle[0]), 0.7 * float(scene.reach[0])),
         plain("detent_y", float(scene.middle[1]), 0.7 * float(scene.reach[1])),
-        positive("detent_width", 0.05, 0.8),
+        positive("detent_width", 0.03, 0.7),
+        plain("detent_at_x", float(scene.centroid[0]), 0.6 * float(scene.half[0])),
+        plain("detent_at_y", float(scene.centroid[1]), 0.6 * float(scene.half[1])),
     )
 
 
@@ -23,7 +25,7 @@ def where(values: Values, scene: Scene) -> Where | None:
 EFFECT = Effect(
     name="detent",
     summary="A catch (magnet, latch, door seal) holds the body near one place.",
-    equation="F = -F_0 (d / w) exp(1/2 - d^2 / 2 w^2) towards the place, its peak F_0 at the distance w",
+    equation="F = -F_0 (d / w) exp(1/2 - d^2 / 2 w^2) from a point of the body to the place, its peak F_0 at d = w",
     shows="Go slowly through the place, in both directions.",
     parameters=parameters,
     variants=(
@@ -33,8 +35,17 @@ EFFECT = Effect(
             "detent_y",
             "detent_width",
         ),
+        (
+            "detent_force",
+            "detent_x",
+            "detent_y",
+            "detent_width",
+            "detent_at_x",
+            "detent_at_y",
+        ),
     ),
     where=where,
     direction="place",
     linear=("detent_force",),
+    pulls=("detent_x", "detent_y", "detent_at_x", "detent_at_y"),
 )

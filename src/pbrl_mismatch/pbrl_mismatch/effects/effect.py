@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -115,12 +115,15 @@ class Effect:
         parameters: what it adds to the parameter row, given the scene.
         variants: sub-models, each the columns that are free in it; the others of `fixed` or off.
         fixed: columns that are given a value while the effect is on.
+        fixed_in: others that are given one in some variants alone, by the variant's number.
         where: the place it has, from its parameters, or None.
         when: the column of the moment at which it comes on, or None.
         direction: the frame in which its force keeps its direction, or what it follows.
         angles: columns that live on a circle.
         linear: columns that the effect's wrench is proportional to, all together.
         touches: columns x, y and radius of a disc that touches the footprint, where the effect is a contact.
+        pulls: columns x and y of a place in the world, then of the point of the body that is drawn to it.
+        cord: column of the length below which nothing pulls.
         remembers: whether more moves than the body, so that its past matters.
     """
 
@@ -130,19 +133,26 @@ class Effect:
     shows: str
     parameters: Callable[[Scene], tuple[Parameter, ...]]
     variants: tuple[tuple[str, ...], ...]
-    fixed: Mapping[str, float] | None = None
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    fixed_in: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
     where: Callable[[Values, Scene], Where | None] | None = None
     when: str | None = None
     direction: str | None = None
     angles: tuple[str, ...] = ()
     linear: tuple[str, ...] = ()
     touches: tuple[str, str, str] | None = None
+    pulls: tuple[str, ...] = ()
+    cord: str | None = None
     remembers: bool = False
 
     def chosen(self, scene: Scene, variant: int) -> tuple[Parameter, ...]:
         """Return the parameters that are free in one variant."""
         known = {parameter.column: parameter for parameter in self.parameters(scene)}
         return tuple(known[column] for column in self.variants[variant])
+
+    def given(self, variant: int) -> Mapping[str, float]:
+        """Return the columns that have a fixed value in one variant."""
+        return {**self.fixed, **self.fixed_in.get(variant, {})}
 
 
 def disc(frame: Site, x: float, y: float, radius: float) -> Where:

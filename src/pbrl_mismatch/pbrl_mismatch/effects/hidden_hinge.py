@@ -11,6 +11,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         positive("pivot_stiffness", 4000.0, 1.0),
         plain("pivot_x", float(scene.middle[0]), 0.8 * float(scene.reach[0])),
         plain("pivot_y", float(scene.middle[1]), 0.8 * float(scene.reach[1])),
+        positive("pivot_damping", 0.2, 0.7),
     )
 
 
@@ -30,6 +31,7 @@ EFFECT = Effect(
             "pivot_stiffness",
             "pivot_x",
             "pivot_y",
+            "pivot_damping",
         ),
     ),
     where=where,

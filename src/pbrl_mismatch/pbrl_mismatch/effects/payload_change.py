@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain, positive
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
     """Return what is believed of its parameters."""
     return (
-        plain("payload_mass", 0.0, 0.3 * scene.mass),
+        positive("payload_mass", 0.3 * scene.mass, 0.7),
         plain("payload_time", scene.start + 0.5 * scene.seconds, 0.35 * scene.seconds),
         plain("payload_x", float(scene.centroid[0]), 0.5 * float(scene.half[0])),
         plain("payload_y", float(scene.centroid[1]), 0.5 * float(scene.half[1])),
@@ -23,7 +23,7 @@ def where(values: Values, scene: Scene) -> Where | None:
 EFFECT = Effect(
     name="payload_change",
     summary="Something is put on or taken off at some moment.",
-    equation="m -> m + M at t_p; M sits at a point of the body, so centre of mass and inertia move too",
+    equation="m -> m + M or m + M -> m at t_p; M sits at a point, so centre of mass and inertia move too",
     shows="Push with the same force before and after.",
     parameters=parameters,
     variants=(
@@ -33,7 +33,14 @@ EFFECT = Effect(
             "payload_x",
             "payload_y",
         ),
+        (
+            "payload_mass",
+            "payload_time",
+            "payload_x",
+            "payload_y",
+        ),
     ),
+    fixed_in={1: {"payload_gone": 1.0}},
     where=where,
     when="payload_time",
     direction="acceleration",

@@ -41,4 +41,6 @@ EFFECT = Effect(
     where=where,
     direction="anchor",
     linear=("tether_stiffness",),
+    pulls=("tether_x", "tether_y", "tether_at_x", "tether_at_y"),
+    cord="tether_length",
 )

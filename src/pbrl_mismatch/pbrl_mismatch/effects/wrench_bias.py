@@ -11,6 +11,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         plain("bias_x", 0.0, 4.0),
         plain("bias_y", 0.0, 4.0),
         plain("bias_torque", 0.0, 1.0),
+        plain("bias_start", scene.start + 0.4 * scene.seconds, 0.3 * scene.seconds),
         plain("drift_x", 0.0, 0.2),
         plain("drift_y", 0.0, 0.2),
         plain("drift_torque", 0.0, 0.05),
@@ -20,7 +21,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 EFFECT = Effect(
     name="wrench_bias",
     summary="The force sensor reads an offset, or one that drifts.",
-    equation="felt = true + b + d t in the sensor's axes",
+    equation="felt = true + b or b [t > t_0] or d (t - t_grasp), in the sensor's axes, after it was read at rest",
     shows="A force that is constant in the gripper's axes: turn the body.",
     parameters=parameters,
     variants=(
@@ -30,18 +31,17 @@ EFFECT = Effect(
             "bias_torque",
         ),
         (
-            "drift_x",
-            "drift_y",
-            "drift_torque",
-        ),
-        (
             "bias_x",
             "bias_y",
             "bias_torque",
+            "bias_start",
+        ),
+        (
             "drift_x",
             "drift_y",
             "drift_torque",
         ),
     ),
     direction="gripper",
+    linear=("bias_x", "bias_y", "bias_torque", "drift_x", "drift_y", "drift_torque"),
 )

@@ -9,7 +9,6 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
     """Return what is believed of its parameters."""
     return (
         positive("force_scale", 1.0, 0.25),
-        positive("torque_scale", 1.0, 0.25),
         plain("sensor_turn", 0.0, 0.3),
     )
 
@@ -27,11 +26,7 @@ EFFECT = Effect(
         ),
         ("force_scale",),
         ("sensor_turn",),
-        (
-            "force_scale",
-            "torque_scale",
-            "sensor_turn",
-        ),
     ),
+    fixed={"torque_scale": -1.0},
     direction="gripper",
 )

@@ -3,7 +3,9 @@
 The first twelve columns are those of `pbrl_model.parameters.KERNEL_COLUMNS`. An effect is off where its strength is
 zero; its other columns then do not matter. `cone` chooses the law of the baseline's wheel: 0 limits its friction along
 each axis alone, as the thesis and `pbrl_model.kernel` do; 1 limits both together by an ellipse, as rubber on a floor
-does. A `mu_y` or `wheel2_mu_y` below zero stands for one that is the same as that along x.
+does. A `mu_y` or `wheel2_mu_y` below zero stands for one that is the same as that along x, a
+`torque_scale` below zero for one that is the same as `force_scale`. `payload_gone` 1 stands for a load that is there
+from the start and is taken off.
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("com_y", "m", 0.0),
     ("payload_mass", "kg", 0.0),
     ("payload_time", "s", 0.0),
+    ("payload_gone", "1", 0.0),
     ("payload_x", "m", 0.0),
     ("payload_y", "m", 0.0),
     ("tether_stiffness", "N/m", 0.0),
@@ -47,6 +50,8 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("tether_length", "m", 0.0),
     ("tether_at_x", "m", 0.0),
     ("tether_at_y", "m", 0.0),
+    ("force_start", "s", -math.inf),
+    ("force_end", "s", math.inf),
     ("steady_x", "N", 0.0),
     ("steady_y", "N", 0.0),
     ("steady_torque", "N m", 0.0),
@@ -70,15 +75,20 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("caster_scrub", "1", 0.0),
     ("caster_heading", "rad", 0.0),
     ("slosh_mass", "kg", 0.0),
+    ("slosh_x", "m", 0.0),
+    ("slosh_y", "m", 0.0),
     ("slosh_frequency", "Hz", 1.0),
     ("slosh_damping", "1", 0.1),
     ("detent_force", "N", 0.0),
     ("detent_x", "m", 0.0),
     ("detent_y", "m", 0.0),
     ("detent_width", "m", 0.05),
+    ("detent_at_x", "m", 0.0),
+    ("detent_at_y", "m", 0.0),
     ("pivot_stiffness", "N/m", 0.0),
     ("pivot_x", "m", 0.0),
     ("pivot_y", "m", 0.0),
+    ("pivot_damping", "1", 0.3),
     ("unseen_force", "N", 0.0),
     ("unseen_x", "m", 0.0),
     ("unseen_y", "m", 0.0),
@@ -86,6 +96,7 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("bias_x", "N", 0.0),
     ("bias_y", "N", 0.0),
     ("bias_torque", "N m", 0.0),
+    ("bias_start", "s", -math.inf),
     ("drift_x", "N/s", 0.0),
     ("drift_y", "N/s", 0.0),
     ("drift_torque", "N m/s", 0.0),
@@ -97,7 +108,7 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("tag_y", "m", 0.0),
     ("tag_theta", "rad", 0.0),
     ("grip_compliance", "m/N", 0.0),
-    ("grip_turn", "rad/(N m)", 0.0),
+    ("grip_play", "m", 0.0),
 )
 
 COLUMNS: tuple[str, ...] = (*KERNEL_COLUMNS, *(name for name, _, _ in _EFFECT_COLUMNS))

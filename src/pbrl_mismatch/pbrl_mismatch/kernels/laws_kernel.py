@@ -23,6 +23,8 @@ CREEP = 1e-3
 """Dry friction is viscous below this sliding speed [m/s]."""
 BORDER = 0.01
 """A patch's border is so soft [m]: a foot has a width, and a fit needs a slope."""
+SWITCHING = 0.1
+"""What begins at some moment comes on within this time [s]: a fit needs a slope."""
 SETTLING = 0.02
 """Time in which a contact's or a cord's oscillation is damped [s]: damping over stiffness."""
 UNSEEN_STIFFNESS = 5000.0
@@ -75,6 +77,14 @@ def nearest_edge(outline: Array, bx: float, by: float) -> tuple[float, float, fl
     if not inside and best > 1e-9:
         nx, ny = (bx - px) / best, (by - py) / best
     return (-best if inside else best), px, py, nx, ny
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def between(time: float, start: float, end: float) -> float:
+    """Return 1 within an interval of time, 0 outside, with edges so soft that a fit has a slope."""
+    if time < start - 0.5 * SWITCHING or time > end + 0.5 * SWITCHING:
+        return 0.0
+    return min((time - start) / SWITCHING + 0.5, (end - time) / SWITCHING + 0.5, 1.0)
 
 
 @njit(cache=True, error_model="numpy")
@@ -149,11 +159,12 @@ def springs(
         acc: (9,) account.
     """
     weight = mass * GRAVITY
-    acc[0] += weight * p[at.SLOPE_X] + p[at.STEADY_X]
-    acc[1] += weight * p[at.SLOPE_Y] + p[at.STEADY_Y]
-    acc[2] += p[at.STEADY_TORQUE]
-    if p[at.PERIODIC_FREQUENCY] > 0.0:
-        wave = math.sin(2.0 * math.pi * p[at.PERIODIC_FREQUENCY] * time + p[at.PERIODIC_PHASE])
+    on = between(time, p[at.FORCE_START], p[at.FORCE_END])
+    acc[0] += weight * p[at.SLOPE_X] + on * p[at.STEADY_X]
+    acc[1] += weight * p[at.SLOPE_Y] + on * p[at.STEADY_Y]
+    acc[2] += on * p[at.STEADY_TORQUE]
+    if p[at.PERIODIC_FREQUENCY] > 0.0 and on > 0.0:
+        wave = on * math.sin(2.0 * math.pi * p[at.PERIODIC_FREQUENCY] * time + p[at.PERIODIC_PHASE])
         acc[0] += wave * p[at.PERIODIC_X]
         acc[1] += wave * p[at.PERIODIC_Y]
         acc[2] += wave * p[at.PERIODIC_TORQUE]
@@ -168,7 +179,8 @@ def springs(
             push(acc, rx, ry, force * nx, force * ny)
             resist(acc, rx, ry, nx, ny, k * (dt + SETTLING))
     if p[at.DETENT_FORCE] != 0.0:
-        rx, ry = -c * com[0] + s * com[1], -s * com[0] - c * com[1]
+        ax, ay = p[at.DETENT_AT_X] - com[0], p[at.DETENT_AT_Y] - com[1]
+        rx, ry = c * ax - s * ay, s * ax + c * ay
         dx, dy = state[0] + rx - p[at.DETENT_X], state[1] + ry - p[at.DETENT_Y]
         near = (dx * dx + dy * dy) / p[at.DETENT_WIDTH] ** 2
         k = p[at.DETENT_FORCE] / p[at.DETENT_WIDTH] * math.exp(0.5 - 0.5 * near)
@@ -182,8 +194,9 @@ def springs(
         ax, ay = c0 * dx + s0 * dy - com[0], -s0 * dx + c0 * dy - com[1]
         rx, ry = c * ax - s * ay, s * ax + c * ay
         push(acc, rx, ry, k * (p[at.PIVOT_X] - state[0] - rx), k * (p[at.PIVOT_Y] - state[1] - ry))
-        resist(acc, rx, ry, 1.0, 0.0, k * (dt + SETTLING))
-        resist(acc, rx, ry, 0.0, 1.0, k * (dt + SETTLING))
+        give = k * dt + 2.0 * p[at.PIVOT_DAMPING] * math.sqrt(k * mass)
+        resist(acc, rx, ry, 1.0, 0.0, give)
+        resist(acc, rx, ry, 0.0, 1.0, give)
     if p[at.OBSTACLE_STIFFNESS] > 0.0:
         found = contact(p, outline, state, c, s, com, p[at.OBSTACLE_X], p[at.OBSTACLE_Y], p[at.OBSTACLE_RADIUS])
         depth, rx, ry, nx, ny = found
@@ -206,8 +219,9 @@ def springs(
     if p[at.SLOSH_MASS] > 0.0:
         rate = 2.0 * math.pi * p[at.SLOSH_FREQUENCY]
         k, d = p[at.SLOSH_MASS] * rate * rate, 2.0 * p[at.SLOSH_MASS] * p[at.SLOSH_DAMPING] * rate
-        acc[0] += k * state[SLOSH] + d * state[SLOSH + 2]
-        acc[1] += k * state[SLOSH + 1] + d * state[SLOSH + 3]
+        ax, ay = p[at.SLOSH_X] - com[0], p[at.SLOSH_Y] - com[1]
+        fx, fy = k * state[SLOSH] + d * state[SLOSH + 2], k * state[SLOSH + 1] + d * state[SLOSH + 3]
+        push(acc, c * ax - s * ay, s * ax + c * ay, fx, fy)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

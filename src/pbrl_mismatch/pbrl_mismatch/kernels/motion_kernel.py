@@ -1,7 +1,7 @@
 """Compiled: poses at recorded times for many parameter rows and windows, each with its own start.
 
 What is in motion besides the body when a window begins (a swinging load, the casters' headings, a body that was pushed
-along) follows from what was recorded before it: `rehearse` runs it along the recorded motion.
+along) follows from what was recorded before it: `rehearse_windows` runs it along the recorded motion.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.laws_kernel import CASTERS, FIRST_CASTER, STATE, UNSEEN, move_unseen
+from pbrl_mismatch.kernels.laws_kernel import CASTERS, FIRST_CASTER, SLOSH, STATE, UNSEEN, move_unseen
 from pbrl_mismatch.kernels.sense_kernel import acting, as_seen, load_now, to_truth
 from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body, swing_load, turn_casters
 from pbrl_model.kernel import cos_sin
@@ -23,51 +23,66 @@ Index = NDArray[np.int64]
 
 FIRST, STEPS, BEGIN, LAST = 0, 1, 2, 3
 """Columns of a window's whole numbers: first step, how many, first and last step of its episode."""
-REHEARSAL = 4.0
-"""A swinging load and casters forget what was longer ago [s]."""
 STRIDES = 4
 """A rehearsal of casters and of a body pushed along goes in steps of so many."""
+
+
+@njit(cache=True, error_model="numpy")
+def rehearse_windows(
+    p: Array, seen: Array, span: Index, body: Array, outline: Array, feet: Array, com: Array, memory: Array
+) -> None:
+    """Find what moves besides the body as it is when each window starts, in one walk along the recorded motion.
+
+    Casters, and a body that was met, stay as they were between two grasps; a load has come to rest by then.
+
+    Args:
+        p: (WIDTH,) parameter row.
+        seen: (T, 6) smoothed states.
+        span: (W, 4) of the windows, in the order of their first steps.
+        body: see `sense_kernel.load_now`.
+        outline: (E, 2).
+        feet: (F, 2).
+        com: (2,) centre of mass in the body's frame [m].
+        memory: (W, STATE) whose columns past the sixth are written.
+    """
+    memory[:, FIRST_CASTER:] = 0.0
+    casters = p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0
+    swings, meets = p[at.SLOSH_MASS] > 0.0, p[at.UNSEEN_FORCE] > 0.0
+    if not (casters or swings or meets):
+        return
+    dt, state = body[3], np.zeros(STATE)
+    state[UNSEEN], state[UNSEEN + 1] = p[at.UNSEEN_X], p[at.UNSEEN_Y]
+    for i in range(CASTERS):
+        state[FIRST_CASTER + i] = seen[0, 2] + p[at.CASTER_HEADING]
+    stride, t, begin = 1 if swings else STRIDES, 0, 0
+    for w in range(span.shape[0]):
+        while True:
+            if span[w, BEGIN] > begin and t >= span[w, BEGIN]:
+                begin = span[w, BEGIN]
+                state[SLOSH : SLOSH + 4] = 0.0
+            if t >= span[w, FIRST]:
+                break
+            to_truth(p, seen[t], body, com, state)
+            c, s = math.cos(state[2]), math.sin(state[2])
+            if casters:
+                turn_casters(p, state, c, s, com, feet, stride * dt)
+            if meets:
+                move_unseen(p, outline, state, c, s, com)
+            if swings and t + 1 < seen.shape[0] and t + 1 != span[w, BEGIN]:
+                ax, ay = (seen[t + 1, 3] - seen[t, 3]) / dt, (seen[t + 1, 4] - seen[t, 4]) / dt
+                swing_load(p, state, ax, ay, (seen[t + 1, 5] - seen[t, 5]) / dt, c, s, com, dt)
+            t += stride
+        memory[w, FIRST_CASTER:] = state[FIRST_CASTER:]
 
 
 @njit(cache=True, error_model="numpy")
 def rehearse(
     p: Array, seen: Array, span: Index, body: Array, outline: Array, feet: Array, com: Array, state: Array
 ) -> None:
-    """Set what moves besides the body, as it is at the start of a window.
-
-    Args:
-        p: (WIDTH,) parameter row.
-        seen: (T, 6) smoothed states.
-        span: (4,) of the window.
-        body: see `sense_kernel.load_now`.
-        outline: (E, 2).
-        feet: (F, 2).
-        com: (2,) centre of mass in the body's frame [m].
-        state: (STATE,) whose entries past the sixth are written.
-    """
-    state[FIRST_CASTER:] = 0.0
-    casters = p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0
-    swings, meets = p[at.SLOSH_MASS] > 0.0, p[at.UNSEEN_FORCE] > 0.0
-    if not (casters or swings or meets):
-        return
-    dt = body[3]
-    x, y, theta = state[0], state[1], state[2]
-    vx, vy, omega = state[3], state[4], state[5]
-    state[UNSEEN], state[UNSEEN + 1] = p[at.UNSEEN_X], p[at.UNSEEN_Y]
-    for i in range(CASTERS):
-        state[FIRST_CASTER + i] = seen[span[BEGIN], 2] + p[at.CASTER_HEADING]
-    begin = span[BEGIN] if meets else max(span[BEGIN], span[FIRST] - int(REHEARSAL / dt))
-    stride = 1 if swings else STRIDES
-    for t in range(begin, span[FIRST], stride):
-        to_truth(p, seen[t], body, com, state)
-        c, s = math.cos(state[2]), math.sin(state[2])
-        if casters:
-            turn_casters(p, state, c, s, com, feet, stride * dt)
-        if meets:
-            move_unseen(p, outline, state, c, s, com)
-        if swings:
-            swing_load(p, state, (seen[t + 1, 3] - seen[t, 3]) / dt, (seen[t + 1, 4] - seen[t, 4]) / dt, dt)
-    state[0], state[1], state[2], state[3], state[4], state[5] = x, y, theta, vx, vy, omega
+    """Do what `rehearse_windows` does for one window (4,), into the entries of a state (STATE,) past the sixth."""
+    memory = np.empty((1, STATE))
+    rehearse_windows(p, seen, span.reshape(1, 4), body, outline, feet, com, memory)
+    state[FIRST_CASTER:] = memory[0, FIRST_CASTER:]
 
 
 @njit(cache=True, error_model="numpy")
@@ -85,16 +100,20 @@ def simulate_window(
     outline: Array,
     feet: Array,
     place: Array,
+    memory: Array,
     out: Array,
 ) -> None:
-    """Simulate one row over one window, see `simulate_serial`; its arguments without their first axes."""
+    """Simulate one row over one window, see `simulate_serial`; its arguments without their first axes.
+
+    `memory` (STATE,) is what `rehearse_windows` found.
+    """
     state, com, acc, wrench = np.empty(STATE), np.empty(2), np.empty(9), np.empty(3)
     before, after, axes = np.empty(3), np.empty(3), np.empty(5)
     first, steps, dt = span[FIRST], span[STEPS], body[3]
     knots = extra.shape[0] - 1
     mass, inertia = load_now(p, clock[first], body, com)
     to_truth(p, told, body, com, state)
-    rehearse(p, seen, span, body, outline, feet, com, state)
+    state[FIRST_CASTER:] = memory[FIRST_CASTER:]
     fixed_axes(p, dt, axes)
     n, poses = 0, place.shape[0]
     loaded = p[at.PAYLOAD_MASS] != 0.0
@@ -102,8 +121,13 @@ def simulate_window(
     for k in range(steps):
         t = first + k
         if loaded:
-            oldx, oldy = com[0], com[1]
+            oldx, oldy, lighter, easier = com[0], com[1], mass, inertia
             mass, inertia = load_now(p, clock[t], body, com)
+            if mass > lighter:
+                # What is put on was at rest: it takes its share of the momentum.
+                state[3] *= lighter / mass
+                state[4] *= lighter / mass
+                state[5] *= min(easier / inertia, 1.0)
             if com[0] != oldx or com[1] != oldy:
                 dx = c * (com[0] - oldx) - s * (com[1] - oldy)
                 dy = s * (com[0] - oldx) + c * (com[1] - oldy)
@@ -111,7 +135,7 @@ def simulate_window(
                 state[1] += dy
                 state[3] -= state[5] * dy
                 state[4] += state[5] * dx
-        acting(p, felt, mount, seen, t, span[BEGIN], span[LAST], clock[t], body, com, wrench)
+        acting(p, felt, mount, seen, t, span[BEGIN], span[LAST], clock[t], clock[span[BEGIN]], body, com, wrench)
         where = knots * k / steps
         knot = int(where)
         share = where - knot
@@ -161,7 +185,7 @@ def simulate_serial(
         mount: (T, 4) cosine and sine of the sensor's turn, its place from the nominal centre of mass [m], world axes.
         seen: (T, 6) smoothed states of the nominal centre of mass.
         clock: (T,) times of the steps [s].
-        span: (W, 4) first step, steps, first and last step of the episode.
+        span: (W, 4) first step, steps, first and last step of the episode; in the order of their first steps.
         pivot: (W, 3) pose of the body's frame at the start of the episode.
         body: (4,) nominal inertia over mass [m^2], centre of mass (x, y) [m], dt [s].
         outline: (E, 2) footprint [m], counter-clockwise.
@@ -169,25 +193,28 @@ def simulate_serial(
         place: (W, N) where each recorded pose lies, in steps from the window's start, in order.
         out: (P, W, N, 3) poses of the body's frame as tags would see it, written.
     """
-    windows = span.shape[0]
-    for job in range(rows.shape[0] * windows):
-        r, w = job // windows, job % windows
-        simulate_window(
-            rows[r],
-            told[r, w],
-            extra[r, w],
-            felt,
-            mount,
-            seen,
-            clock,
-            span[w],
-            pivot[w],
-            body,
-            outline,
-            feet,
-            place[w],
-            out[r, w],
-        )
+    windows, com, memory = span.shape[0], np.empty(2), np.empty((span.shape[0], STATE))
+    for r in range(rows.shape[0]):
+        _, _ = load_now(rows[r], clock[0], body, com)
+        rehearse_windows(rows[r], seen, span, body, outline, feet, com, memory)
+        for w in range(windows):
+            simulate_window(
+                rows[r],
+                told[r, w],
+                extra[r, w],
+                felt,
+                mount,
+                seen,
+                clock,
+                span[w],
+                pivot[w],
+                body,
+                outline,
+                feet,
+                place[w],
+                memory[w],
+                out[r, w],
+            )
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
@@ -207,26 +234,29 @@ def simulate_parallel(
     place: Array,
     out: Array,
 ) -> None:
-    """Do what `simulate_serial` does on all cores; each (row, window) is its own work, so the bytes are the same."""
-    windows = span.shape[0]
-    for job in prange(rows.shape[0] * windows):
-        r, w = job // windows, job % windows
-        simulate_window(
-            rows[r],
-            told[r, w],
-            extra[r, w],
-            felt,
-            mount,
-            seen,
-            clock,
-            span[w],
-            pivot[w],
-            body,
-            outline,
-            feet,
-            place[w],
-            out[r, w],
-        )
+    """Do what `simulate_serial` does on all cores; each row is its own work, so the bytes are the same."""
+    for r in prange(rows.shape[0]):
+        com, memory = np.empty(2), np.empty((span.shape[0], STATE))
+        _, _ = load_now(rows[r], clock[0], body, com)
+        rehearse_windows(rows[r], seen, span, body, outline, feet, com, memory)
+        for w in range(span.shape[0]):
+            simulate_window(
+                rows[r],
+                told[r, w],
+                extra[r, w],
+                felt,
+                mount,
+                seen,
+                clock,
+                span[w],
+                pivot[w],
+                body,
+                outline,
+                feet,
+                place[w],
+                memory[w],
+                out[r, w],
+            )
 
 
 @njit(cache=True, error_model="numpy")
@@ -251,7 +281,7 @@ def step_seen(
 ) -> None:
     """Move a true state (STATE,) from step `t` to the next with a wrench `extra` (3,) in world axes added."""
     mass, inertia = load_now(p, clock[t], body, com)
-    acting(p, felt, mount, seen, t, span[BEGIN], span[LAST], clock[t], body, com, wrench)
+    acting(p, felt, mount, seen, t, span[BEGIN], span[LAST], clock[t], clock[span[BEGIN]], body, com, wrench)
     wrench[0] += extra[0]
     wrench[1] += extra[1]
     wrench[2] += extra[2]

@@ -13,17 +13,17 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
+from pbrl_mismatch.kernels.laws_kernel import SWITCHING, between
 from pbrl_model.kernel import cos_sin
 
 Array = NDArray[np.float64]
-
-SWITCHING = 0.1
-"""A load comes on within this time [s]: a fit needs a slope."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def load_now(p: Array, time: float, body: Array, com: Array) -> tuple[float, float]:
     """Return mass [kg] and moment of inertia [kg m^2]; write the centre of mass in the body's frame (2,).
+
+    A load that swings is part of what the body weighs, and moves by itself: the rest has the rest of the mass.
 
     Args:
         p: (WIDTH,) parameter row.
@@ -34,8 +34,12 @@ def load_now(p: Array, time: float, body: Array, com: Array) -> tuple[float, flo
     mass = p[at.MASS]
     inertia = mass * body[0] * p[at.INERTIA_FACTOR]
     com[0], com[1] = body[1] + p[at.COM_X], body[2] + p[at.COM_Y]
+    if p[at.SLOSH_MASS] > 0.0:
+        mass = max(mass - p[at.SLOSH_MASS], 0.2 * mass)
+        inertia *= mass / p[at.MASS]
     if p[at.PAYLOAD_MASS] != 0.0:
         share = min(max((time - p[at.PAYLOAD_TIME]) / SWITCHING + 0.5, 0.0), 1.0)
+        share = 1.0 - share if p[at.PAYLOAD_GONE] > 0.0 else share
         load = max(share * p[at.PAYLOAD_MASS], -0.8 * mass)
         dx, dy = p[at.PAYLOAD_X] - com[0], p[at.PAYLOAD_Y] - com[1]
         mass += load
@@ -56,6 +60,7 @@ def acting(
     first: int,
     last: int,
     time: float,
+    begun: float,
     body: Array,
     com: Array,
     out: Array,
@@ -71,6 +76,7 @@ def acting(
         first: first step of the episode.
         last: last step of the episode.
         time: of the step [s].
+        begun: when the episode began [s]; just before, the sensor was read at rest, so that an older offset is known.
         body: see `load_now`.
         com: (2,) centre of mass in the body's frame [m].
         out: (3,) written.
@@ -82,10 +88,15 @@ def acting(
         before = min(math.floor(place), last - 1) if last > first else first
         share = place - before if last > first else 0.0
     after = min(before + 1, last)
-    fx = felt[before, 0] + share * (felt[after, 0] - felt[before, 0]) - p[at.BIAS_X] - p[at.DRIFT_X] * time
-    fy = felt[before, 1] + share * (felt[after, 1] - felt[before, 1]) - p[at.BIAS_Y] - p[at.DRIFT_Y] * time
-    tau = felt[before, 2] + share * (felt[after, 2] - felt[before, 2]) - p[at.BIAS_TORQUE] - p[at.DRIFT_TORQUE] * time
-    fx, fy, tau = fx / p[at.FORCE_SCALE], fy / p[at.FORCE_SCALE], tau / p[at.TORQUE_SCALE]
+    on, since = 1.0, time - begun
+    if p[at.BIAS_START] > -math.inf:
+        on = between(time, p[at.BIAS_START], math.inf) - between(begun, p[at.BIAS_START], math.inf)
+    fx = felt[before, 0] + share * (felt[after, 0] - felt[before, 0]) - on * p[at.BIAS_X] - p[at.DRIFT_X] * since
+    fy = felt[before, 1] + share * (felt[after, 1] - felt[before, 1]) - on * p[at.BIAS_Y] - p[at.DRIFT_Y] * since
+    tau = felt[before, 2] + share * (felt[after, 2] - felt[before, 2])
+    tau -= on * p[at.BIAS_TORQUE] + p[at.DRIFT_TORQUE] * since
+    torque_scale = p[at.TORQUE_SCALE] if p[at.TORQUE_SCALE] > 0.0 else p[at.FORCE_SCALE]
+    fx, fy, tau = fx / p[at.FORCE_SCALE], fy / p[at.FORCE_SCALE], tau / torque_scale
     pc, ps = mount[t, 0], mount[t, 1]
     if p[at.SENSOR_TURN] != 0.0:
         tc, ts = math.cos(p[at.SENSOR_TURN]), math.sin(p[at.SENSOR_TURN])

@@ -228,7 +228,6 @@ def pushes_along(
         p = rows[r]
         fixed_axes(p, body[3], axes)
         _, _ = load_now(p, clock[span[0]], body, com)
-        state[:6] = path[0]
         rehearse(p, seen, span, body, outline, feet, com, state)
         for n in range(out.shape[1]):
             t = n * stride

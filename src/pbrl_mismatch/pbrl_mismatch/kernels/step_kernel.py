@@ -169,8 +169,14 @@ def turn_casters(p: Array, state: Array, c: float, s: float, com: Array, feet: A
 
 
 @njit(cache=True, error_model="numpy")
-def swing_load(p: Array, state: Array, ax: float, ay: float, dt: float) -> None:
-    """Move the load that swings inside a body that accelerates by (ax, ay) [m/s^2]."""
+def swing_load(
+    p: Array, state: Array, ax: float, ay: float, turn: float, c: float, s: float, com: Array, dt: float
+) -> None:
+    """Move the load that swings inside a body whose centre of mass accelerates by (ax, ay) [m/s^2] and `turn`."""
+    bx, by = p[at.SLOSH_X] - com[0], p[at.SLOSH_Y] - com[1]
+    rx, ry = c * bx - s * by, s * bx + c * by
+    ax -= turn * ry + state[5] * state[5] * rx
+    ay += turn * rx - state[5] * state[5] * ry
     rate = 2.0 * math.pi * p[at.SLOSH_FREQUENCY]
     damping = 2.0 * p[at.SLOSH_DAMPING] * rate
     for k in range(2):
@@ -233,7 +239,7 @@ def step_body(
                 break
     else:
         vx, vy, omega = solve_resisted(state, mass, inertia, acc, dt)
-    ax, ay = (vx - state[3]) / dt, (vy - state[4]) / dt
+    ax, ay, turned = (vx - state[3]) / dt, (vy - state[4]) / dt, (omega - state[5]) / dt
     state[3], state[4], state[5] = vx, vy, omega
     hold(p, state, c, s, mass, inertia, com, axes, dt)
     if p[at.MU_GROUND] > 0.0:
@@ -244,7 +250,7 @@ def step_body(
         state[4] *= kept
         state[5] *= kept
     if p[at.SLOSH_MASS] > 0.0:
-        swing_load(p, state, ax, ay, dt)
+        swing_load(p, state, ax, ay, turned, c, s, com, dt)
     if p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0:
         turn_casters(p, state, c, s, com, feet, dt)
     return c, s

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_mismatch.search.objective import Objective, Reduced, reduce
+from pbrl_mismatch.search.objective import Objective, Reduced, nuisance_step, reduce
 
 Array = NDArray[np.float64]
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-6, 1e8
 EASIER, HARDER = 0.3, 6.0
 TRIALS = 3
+ROUNDS, SHORTER = 4, 0.3
+"""Steps of the nuisances alone at most; how much shorter a window's next one is where one was too long."""
+FRESH = 2
+"""Slopes in the nuisances are taken anew every so many steps."""
 SETTLED = 0.02
 """A gain below this [nat] of all starts ends the climb."""
 
@@ -27,8 +31,8 @@ class Peak:
         objective: what was minimised.
         coordinates: (P, K).
         nuisance: (P, W, NUISANCES).
-        misfit: (P,) of the data, not scaled.
-        sigma: (P,) scale of the noise, at least one.
+        misfit: (P, W) of the data, not scaled.
+        weight: (P, W) of each window: one over its scale squared.
         reduced: normal equations there.
         evidence: (P,) log evidence by Laplace [nat], up to what is common to all hypotheses over these windows.
         settled: (P,) whether the last step gained next to nothing.
@@ -38,16 +42,20 @@ class Peak:
     coordinates: Array
     nuisance: Array
     misfit: Array
-    sigma: Array
+    weight: Array
     reduced: Reduced
     evidence: Array
     settled: NDArray[np.bool_]
 
     def covariance(self, row: int) -> Array:
         """Return (K, K) of the coordinates at one point."""
-        return np.linalg.inv(_curvature(self.objective, self.reduced.matrix[row : row + 1], self.sigma[row : row + 1]))[
-            0
-        ]
+        matrix = np.einsum("w,wkl->kl", self.weight[row], self.reduced.matrix[row])
+        return np.linalg.inv(matrix + np.diag(self.objective.hypothesis.spread**-2.0))
+
+    @property
+    def sigma(self) -> Array:
+        """Return (P,) the scale of the noise over all windows, at least one."""
+        return np.sqrt(np.maximum(1.0, self.misfit.sum(axis=1) / self.objective.observations))
 
     @property
     def best(self) -> int:
@@ -62,38 +70,36 @@ class Peak:
             self.coordinates[rows],
             self.nuisance[rows],
             self.misfit[rows],
-            self.sigma[rows],
+            self.weight[rows],
             Reduced(r.matrix[rows], r.vector[rows], r.gain[rows], r.shift[rows], r.log_det[rows]),
             self.evidence[rows],
             self.settled[rows],
         )
 
 
-def _scale(misfit: Array, count: int) -> Array:
-    return np.sqrt(np.maximum(1.0, misfit / count))
-
-
-def _cost(misfit: Array, prior: Array, count: int) -> Array:
-    """Return (P,) minus twice the log posterior at the best sigma of at least one."""
-    sigma = _scale(misfit, count)
-    return misfit / sigma**2 + 2.0 * count * np.log(sigma) + prior
-
-
-def _curvature(objective: Objective, matrix: Array, sigma: Array) -> Array:
-    return matrix / (sigma**2)[:, None, None] + np.diag(objective.hypothesis.spread**-2.0)
+def _cost(objective: Objective, coordinates: Array, misfit: Array) -> Array:
+    """Return (P,) minus twice the log posterior at the best scales."""
+    return -2.0 * objective.likelihood(misfit) + objective.prior_misfit(coordinates)
 
 
 def log_evidence(objective: Objective, coordinates: Array, misfit: Array, reduced: Reduced) -> Array:
     """Return (P,) log evidence by Laplace at points, up to a constant of the windows [nat]."""
-    count = objective.observations
-    sigma = _scale(misfit, count)
     spread = objective.hypothesis.spread
-    _, log_det = np.linalg.slogdet(_curvature(objective, reduced.matrix, sigma) * np.outer(spread, spread))
-    likelihood = -0.5 * misfit / sigma**2 - count * np.log(sigma) - 0.5 * reduced.log_det
-    return likelihood - 0.5 * objective.prior_misfit(coordinates) - 0.5 * log_det
+    matrix, _ = reduced.weighed(objective.weights(misfit))
+    _, log_det = np.linalg.slogdet(matrix * np.outer(spread, spread) + np.eye(len(spread)))
+    value = objective.likelihood(misfit) - 0.5 * reduced.log_det
+    return value - 0.5 * objective.prior_misfit(coordinates) - 0.5 * log_det
 
 
-def climb(objective: Objective, coordinates: Array, nuisance: Array | None = None, *, iterations: int = 12) -> Peak:
+def climb(
+    objective: Objective,
+    coordinates: Array,
+    nuisance: Array | None = None,
+    *,
+    iterations: int = 12,
+    rough: bool = False,
+    spread: Array | None = None,
+) -> Peak:
     """Minimise from many starts.
 
     Args:
@@ -101,32 +107,38 @@ def climb(objective: Objective, coordinates: Array, nuisance: Array | None = Non
         coordinates: (P, K) starts.
         nuisance: (P, W, NUISANCES) to begin with; None: at rest.
         iterations: linearisations at most.
+        rough: keep the slopes in the nuisances from the start to the end; else they are taken anew for the evidence.
+        spread: (P, W, R, NUISANCES) slopes in the nuisances to begin with; None: taken at the starts.
     """
     u = coordinates.copy()
     z = objective.at_rest(len(u)) if nuisance is None else nuisance.copy()
-    count = objective.observations
     damping = np.full(len(u), FIRST_DAMPING)
     prior_precision = objective.hypothesis.spread**-2.0
     gained = np.full(len(u), math.inf)
     most = 3.0 * objective.hypothesis.spread
-    for _ in range(iterations):
-        linear = objective.linearise(u, z)
+    stale = 0 if spread is None else 1
+    for iteration in range(iterations):
+        # How the start and a steady wrench move the poses hardly depends on what acts besides.
+        linear = objective.linearise(u, z, None if (iteration + stale) % FRESH == 0 else spread)
+        spread = linear.spread
+        z, residual, _ = settled(objective, u, z, spread, linear.residual)
+        linear = replace(linear, residual=residual)
         reduced = reduce(linear, z)
         misfit = objective.misfit(linear.residual, z)
-        cost = _cost(misfit, objective.prior_misfit(u), count)
+        cost = _cost(objective, u, misfit)
         gained[:] = 0.0
         open_rows = np.arange(len(u))
-        sigma = _scale(misfit, count)
-        curvature = _curvature(objective, reduced.matrix, sigma)
-        pull = reduced.vector / (sigma**2)[:, None] - (u - objective.hypothesis.mean) * prior_precision
+        matrix, vector = reduced.weighed(objective.weights(misfit))
+        curvature = matrix + np.diag(prior_precision)
+        pull = vector - (u - objective.hypothesis.mean) * prior_precision
         for _ in range(TRIALS):
             damped = curvature[open_rows] + damping[open_rows, None, None] * _diagonal(curvature[open_rows])
             step = np.linalg.solve(damped, pull[open_rows, :, None])[..., 0]
             step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
             shift = reduced.shift[open_rows] - (reduced.gain[open_rows] @ step[:, None, :, None])[..., 0]
             trial_u, trial_z = u[open_rows] + step, z[open_rows] + shift
-            residual = objective.residual(trial_u, trial_z)
-            trial = _cost(objective.misfit(residual, trial_z), objective.prior_misfit(trial_u), count)
+            trial_z, _, misfit = settled(objective, trial_u, trial_z, spread[open_rows])
+            trial = _cost(objective, trial_u, misfit)
             better = trial < cost[open_rows]
             rows = open_rows[better]
             u[rows], z[rows] = trial_u[better], trial_z[better]
@@ -138,11 +150,52 @@ def climb(objective: Objective, coordinates: Array, nuisance: Array | None = Non
                 break
         if np.all(gained < SETTLED):
             break
-    linear = objective.linearise(u, z)
+    linear = objective.linearise(u, z, spread if rough else None)
     reduced = reduce(linear, z)
     misfit = objective.misfit(linear.residual, z)
     evidence = log_evidence(objective, u, misfit, reduced)
-    return Peak(objective, u, z, misfit, _scale(misfit, count), reduced, evidence, gained < 1.0)
+    return Peak(objective, u, z, misfit, objective.weights(misfit), reduced, evidence, gained < 1.0)
+
+
+def most_promising(objective: Objective, coordinates: Array, spread: Array, count: int) -> tuple[Array, Array]:
+    """Return the best starts (count, K) with their nuisances settled (count, W, NUISANCES).
+
+    Args:
+        objective: hypothesis and windows.
+        coordinates: (P, K) starts.
+        spread: (W, R, NUISANCES) slopes in the nuisances of a model nearby.
+        count: how many are wanted.
+    """
+    slopes = np.broadcast_to(spread, (len(coordinates), *spread.shape))
+    z, _, misfit = settled(objective, coordinates, objective.at_rest(len(coordinates)), slopes)
+    best = np.argsort(_cost(objective, coordinates, misfit), kind="stable")[:count]
+    return coordinates[best], z[best]
+
+
+def settled(
+    objective: Objective, coordinates: Array, nuisance: Array, spread: Array, residual: Array | None = None
+) -> tuple[Array, Array, Array]:
+    """Move the nuisances alone, each window's as long as it gains; return them, residuals and misfits (P, W).
+
+    Where feet stick or let go, a step in everything at once lands beside the valley's floor, where the cost says
+    nothing of the coordinates.
+    """
+    if residual is None:
+        residual = objective.residual(coordinates, nuisance)
+    z, here = nuisance, objective.misfit(residual, nuisance)
+    share = np.ones(here.shape)
+    for _ in range(ROUNDS):
+        trial = z + share[..., None] * nuisance_step(spread, residual, z)
+        found = objective.residual(coordinates, trial)
+        there = objective.misfit(found, trial)
+        better = there < here
+        z, residual = np.where(better[..., None], trial, z), np.where(better[..., None], found, residual)
+        gained = float(np.max(np.where(better, here - there, 0.0), initial=0.0))
+        here = np.minimum(here, there)
+        share = np.where(better, 1.0, SHORTER * share)
+        if gained < SETTLED:
+            break
+    return z, residual, here
 
 
 def _diagonal(matrices: Array) -> Array:

@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_mismatch.data.cuts import Cuts
-from pbrl_mismatch.search.climb import Peak
+from pbrl_mismatch.search.climb import Peak, settled
 from pbrl_mismatch.search.objective import Objective, reduce
 
 Array = NDArray[np.float64]
 
 SETTLING_ROUNDS = 3
+"""Times that the slopes in the nuisances are taken anew."""
+REWEIGHED = 3
+"""Times that the windows' weights follow the shift of the parameters."""
 
 
 @dataclass(frozen=True)
@@ -37,36 +40,44 @@ def settle(objective: Objective, coordinates: Array) -> Array:
     z = objective.at_rest(1)
     for _ in range(SETTLING_ROUNDS):
         linear = objective.linearise(coordinates, z)
-        here = np.sum(linear.residual**2, axis=2) + np.sum(z**2, axis=2)
-        trial = z + reduce(linear, z).shift
-        there = np.sum(objective.residual(coordinates, trial) ** 2, axis=2) + np.sum(trial**2, axis=2)
-        z = np.where((there < here)[..., None], trial, z)
+        z, _, _ = settled(objective, coordinates, z, linear.spread, linear.residual)
     return z
 
 
-def held_out_score(peak: Peak, row: int, cuts: Cuts) -> Score:
+def held_out_score(peak: Peak, row: int, cuts: Cuts, told: Cuts | None = None) -> Score:
     """Predict held-out windows.
 
-    The parameters' Gaussian posterior is carried through: with its covariance C, the windows' reduced matrix H and
-    vector g, the log density gains g^T (H + C^-1)^-1 g / 2 - ln det(1 + C H) / 2.
+    The parameters' Gaussian posterior is carried through. With its covariance C, the windows' reduced matrices H and
+    vectors g, weighed as in the fit, and u = (H + C^-1)^-1 g, the log density is that at the shift u of the parameters,
+    less u^T C^-1 u / 2 and ln det(1 + C H) / 2.
 
     Args:
         peak: the fit.
         row: which of its points.
-        cuts: held-out windows.
+        cuts: held-out windows of the fit's length, which are scored.
+        told: longer ones over the same time, whose errors are told; None: the same.
     """
     objective = replace(peak.objective, cuts=cuts)
-    u, sigma = peak.coordinates[row : row + 1], float(peak.sigma[row])
+    u = peak.coordinates[row : row + 1]
     z = settle(objective, u)
     linear = objective.linearise(u, z)
     reduced = reduce(linear, z)
-    matrix, vector = reduced.matrix[0] / sigma**2, reduced.vector[0] / sigma**2
-    covariance = peak.covariance(row)
-    misfit = float(objective.misfit(linear.residual, z)[0])
-    value = -0.5 * misfit / sigma**2 - objective.observations * math.log(sigma) - 0.5 * float(reduced.log_det[0])
-    value += 0.5 * float(vector @ np.linalg.solve(matrix + np.linalg.inv(covariance), vector))
-    value -= 0.5 * float(np.linalg.slogdet(np.eye(len(matrix)) + covariance @ matrix)[1])
-    return Score(value, *errors(linear.residual, cuts))
+    misfit = objective.misfit(linear.residual, z)[0]
+    precision = np.linalg.inv(peak.covariance(row))
+    shift, shifted = np.zeros(len(precision)), misfit
+    for _ in range(REWEIGHED):
+        matrix, vector = (each[0] for each in reduced.weighed(objective.weights(shifted[None])))
+        shift = np.linalg.solve(matrix + precision, vector)
+        along = np.einsum("wk,k->w", reduced.vector[0], shift)
+        across = np.einsum("k,wkl,l->w", shift, reduced.matrix[0], shift)
+        shifted = np.maximum(misfit - 2.0 * along + across, 0.0)
+    value = float(objective.likelihood(shifted[None])[0]) - 0.5 * float(reduced.log_det[0])
+    value -= 0.5 * float(shift @ precision @ shift)
+    value -= 0.5 * float(np.linalg.slogdet(np.eye(len(matrix)) + np.linalg.solve(precision, matrix))[1])
+    if told is None:
+        return Score(value, *errors(linear.residual, cuts))
+    longer = replace(objective, cuts=told)
+    return Score(value, *errors(longer.residual(u, settle(longer, u)), told))
 
 
 def errors(residual: Array, cuts: Cuts) -> tuple[float, float]:

@@ -14,6 +14,11 @@ from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 
 Array = NDArray[np.float64]
 
+SHARE = 1e-2
+"""Of a prior's spread: friction is solved for only so exactly, and a finite difference must be well above that."""
+SMALL = {"m": 0.005, "s": 0.02, "rad": 0.01}
+"""Finite differences at most: borders, edges in time and axes are no softer."""
+
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -71,7 +76,7 @@ class Hypothesis:
         added = effect.chosen(scene, variant)
         names = {parameter.column for parameter in added}
         base = self.base.copy()
-        for column, value in (effect.fixed or {}).items():
+        for column, value in effect.given(variant).items():
             base[COLUMN[column]] = value
         kept = tuple(parameter for parameter in self.parameters if parameter.column not in names)
         return replace(
@@ -151,5 +156,6 @@ def baselines(
 
 
 def step_sizes(hypothesis: Hypothesis) -> Array:
-    """Return (K,) finite differences, a small share of each prior's spread."""
-    return np.clip(2e-3 * hypothesis.spread, 1e-5, math.inf)
+    """Return (K,) finite differences: a share of each prior's spread, at most what is small for its unit."""
+    most = [math.inf if p.positive else SMALL.get(p.unit, math.inf) for p in hypothesis.parameters]
+    return np.clip(SHARE * hypothesis.spread, 1e-5, most)

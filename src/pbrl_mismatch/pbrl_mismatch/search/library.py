@@ -4,27 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_mismatch.data.cuts import Cuts, cut_windows, held_out_blocks, inside, touching
+from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.data.residual import residual_wrench
 from pbrl_mismatch.data.track import Track
-from pbrl_mismatch.effects.effect import Scene
 from pbrl_mismatch.effects.registry import EFFECTS
-from pbrl_mismatch.errors import MismatchError
-from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_mismatch.search.climb import Peak, climb
+from pbrl_mismatch.search.climb import Peak, climb, most_promising
 from pbrl_mismatch.search.contacts import contact_points, with_contacts
-from pbrl_mismatch.search.heldout import Score, held_out_score
+from pbrl_mismatch.search.fitted import (
+    Fitted,
+    Stages,
+    alone,
+    apart,
+    scene_of,
+)
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Objective
+from pbrl_mismatch.search.pulls import with_pulls
 from pbrl_mismatch.search.screen import Lacking, screen
-from pbrl_model.fitting.guesses import axle, circle, pivot
 
 Array = NDArray[np.float64]
 
@@ -32,150 +34,8 @@ IN_ANOTHER_CHANNEL = frozenset({"grasp_compliance"})
 """Effects that the motion of the body does not show where the wrist's force is known."""
 AS_GOOD = 40.0
 """Variants of an effect that are worse than its best by more [nat] are given up."""
-MOVING = 0.02
-"""Slower than this [m/s] is not taken for the speed of a push."""
-
-
-@dataclass(frozen=True)
-class Stages:
-    """Windows of growing length to fit, and what is held out.
-
-    Attributes:
-        fitted: windows by length, held-out blocks cut away.
-        heldout: windows of one block's length, or None where there is nothing to spare.
-    """
-
-    fitted: tuple[Cuts, ...]
-    heldout: Cuts | None
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """One hypothesis after its fit.
-
-    Attributes:
-        hypothesis: what was fitted.
-        peak: its best point alone, over the longest windows.
-        score: on what was held out, or None.
-        short: (K,) best coordinates over the shortest windows, which what is left out bends least; None: not kept.
-    """
-
-    hypothesis: Hypothesis
-    peak: Peak
-    score: Score | None
-    short: Array | None = None
-
-    @property
-    def row(self) -> Array:
-        """Return (WIDTH,) the parameter row."""
-        return self.hypothesis.rows(self.peak.coordinates)[0]
-
-    @property
-    def evidence(self) -> float:
-        """Return the log evidence of the fitted windows, and of the held-out ones given those [nat]."""
-        return float(self.peak.evidence[0]) + (self.score.log_score if self.score else 0.0)
-
-    @property
-    def noise_scale(self) -> float:
-        """Return the scale of the noise that it needs, at least one."""
-        return float(self.peak.sigma[0])
-
-
-def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:
-    """Cut a track into windows of every length, with blocks held out where it is long enough.
-
-    Raises:
-        ModelError: no window has enough poses.
-    """
-    blocks = held_out_blocks(track, options.block, options.every)
-    longest = cut_windows(track, options.block)
-    out = inside(longest, blocks)
-    if not out.any() or out.all():
-        return Stages(tuple(cut_windows(track, length) for length in options.windows), None)
-    fitted = []
-    for length in options.windows:
-        cuts = cut_windows(track, length)
-        fitted.append(cuts.take(~touching(cuts, blocks)))
-    if any(len(cuts) == 0 for cuts in fitted):
-        return Stages(tuple(cut_windows(track, length) for length in options.windows), None)
-    return Stages(tuple(fitted), longest.take(out))
-
-
-def scene_of(track: Track, row: Array) -> Scene:
-    """Return what priors are scaled by, with the mass of a baseline's row."""
-    lower, upper = track.outline.min(axis=0), track.outline.max(axis=0)
-    half = 0.5 * (upper - lower)
-    size = float(np.hypot(*half))
-    low, high = track.seen[:, :2].min(axis=0), track.seen[:, :2].max(axis=0)
-    force = np.hypot(track.felt[:, 0], track.felt[:, 1])
-    speed = np.hypot(track.seen[:, 3], track.seen[:, 4])
-    moving = speed > MOVING
-    return Scene(
-        middle=0.5 * (low + high),
-        reach=0.5 * (high - low) + size,
-        centroid=0.5 * (lower + upper),
-        half=half,
-        mass=float(row[COLUMN["mass"]]),
-        force=max(float(np.sqrt(np.mean(force**2))), 0.5),
-        speed=max(float(np.sqrt(np.mean(speed[moving] ** 2))) if moving.any() else 0.0, MOVING),
-        start=float(track.clock[0]),
-        seconds=float(track.clock[-1] - track.clock[0]),
-    )
-
-
-def fit_from(hypothesis: Hypothesis, stages: Stages, starts: Array, options: DiagnoseOptions) -> Fitted:
-    """Climb from starts (n, K) over windows that grow, keeping the best; judge on what was held out."""
-    u, peak, short = starts[: options.keep[0]], None, None
-    for stage, (cuts, iterations) in enumerate(zip(stages.fitted, options.iterations, strict=True)):
-        peak = climb(Objective(hypothesis, cuts, options.sensor_floor), u, iterations=iterations)
-        order = np.argsort(-peak.evidence, kind="stable")
-        short = peak.coordinates[order[0]] if short is None else short
-        if stage + 1 < len(stages.fitted):
-            u = _apart(peak.coordinates[order], hypothesis.spread, options.keep[stage + 1])
-    if peak is None:
-        raise MismatchError("search: expected at least one length of window, got none")
-    return replace(_judged(hypothesis, peak, stages), short=short)
-
-
-def _apart(coordinates: Array, spread: Array, count: int) -> Array:
-    """Return the first points of a list, leaving out those next to one that is already in."""
-    kept: list[Array] = []
-    for point in coordinates:
-        if all(np.max(np.abs(point - other) / spread) > 0.02 for other in kept):
-            kept.append(point)
-        if len(kept) == count:
-            break
-    return np.array(kept)
-
-
-def fit_baseline(
-    rng: np.random.Generator, track: Track, hypothesis: Hypothesis, stages: Stages, options: DiagnoseOptions
-) -> Fitted:
-    """Fit one kind of baseline from draws of its prior and from what the motion alone suggests."""
-    starts = hypothesis.sample_prior(rng, 2 * options.keep[0] + 6)
-    columns = hypothesis.columns
-    for k, name in enumerate(columns):
-        if name in ("mass", "inertia_factor", "delay"):
-            starts[:, k] = hypothesis.mean[k]
-    if "wheel_x" in columns:
-        x, y = columns.index("wheel_x"), columns.index("wheel_y")
-        com = track.body[1:3]
-        starts[:3, [x, y]] = pivot(track.motions, com)
-        angle, place = axle(track.motions, com)
-        starts[3:6, [x, y]] = place
-        if "wheel_theta" in columns:
-            starts[3:6, columns.index("wheel_theta")] = angle
-    wide = options.model_copy(update={"keep": (len(starts), *options.keep[1:])})
-    return fit_from(hypothesis, stages, starts, wide)
-
-
-def hinge_guess(track: Track) -> dict[str, float] | None:
-    """Return the circle that recorded positions lie on, as a hinge's first guess; None for a line."""
-    found = circle(track.motions)
-    if found is None:
-        return None
-    centre, radius = found
-    return {"hinge_x": float(centre[0]), "hinge_y": float(centre[1]), "hinge_radius": radius}
+CLOSE = (20.0, 10.0)
+"""Effects this near to the likeliest [nat] all go on to longer windows: after the shortest, and after others."""
 
 
 def starts_of(
@@ -192,19 +52,25 @@ def starts_of(
     """
     effect = EFFECTS[name]
     hypothesis = base.hypothesis.with_effect(effect, scene_of(lacking[0].track, base.row), variant)
-    count = options.draws * len(effect.variants[variant]) // 3
+    drawn = [name for name in effect.variants[variant] if name not in effect.linear]
+    count = max(options.draws * len(drawn) // (3 * len(lacking)), 1)
     starts = []
     for each in lacking:
-        draws = hypothesis.sample_prior(rng, max(count // 4 if effect.remembers else count, 8))
+        draws = hypothesis.sample_prior(rng, max(count // 4, 8) if effect.remembers else count)
         for k, column in enumerate(hypothesis.columns):
             if column in base.hypothesis.columns:
                 draws[:, k] = each.coordinates[base.hypothesis.columns.index(column)]
         if effect.touches is not None:
             x, y, radius = (hypothesis.columns.index(column) for column in effect.touches)
             draws = with_contacts(rng, draws, (x, y, radius), *contact_points(each.track, each.residual))
+        if effect.pulls:
+            x, y, *at = (hypothesis.columns.index(name) for name in effect.pulls if name in hypothesis.columns)
+            point = (at[0], at[1]) if at else None
+            cord = hypothesis.columns.index(effect.cord) if effect.cord else None
+            draws = with_pulls(rng, draws, (x, y), point, cord, each.track, each.residual)
         ranked, misfit = screen(each, hypothesis, effect, draws)
-        share = -(-options.keep[0] // len(lacking))
-        starts.append(_apart(ranked[np.argsort(misfit, kind="stable")], hypothesis.spread, share))
+        share = -(-options.candidates // len(lacking))
+        starts.append(apart(ranked[np.argsort(misfit, kind="stable")], hypothesis.spread, share))
     return hypothesis, np.concatenate(starts)
 
 
@@ -236,7 +102,7 @@ def search_library(
         (name, variant, base, lack)
         for base, lack in zip(bases, lacking, strict=True)
         for name in options.effects
-        if name not in base.hypothesis.effects and name not in IN_ANOTHER_CHANNEL
+        if name not in base.hypothesis.effects and name not in IN_ANOTHER_CHANNEL and not _same(name, base, options)
         for variant in range(len(EFFECTS[name].variants))
     ]
     seeds = seed.spawn(len(jobs))
@@ -246,43 +112,76 @@ def search_library(
         return starts_of(np.random.default_rng(seeds[k]), name, variant, base, lack, options)
 
     with ThreadPoolExecutor(options.workers) as pool:
-        running = list(pool.map(begin, range(len(jobs))))
+        slopes = {id(base): _nuisance_slopes(base, stages.fitted[0], options) for base in bases}
+        begun = pool.map(begin, range(len(jobs)))
+        under = [slopes[id(base)] for _, _, base, _ in jobs]
+        peaks = list(pool.map(partial(_first_look, stages.fitted[0], options), begun, under))
+        running = [(peak.objective.hypothesis, peak.coordinates) for peak in peaks]
+        before: list[Peak | None] = [None] * len(running)
         for stage in range(len(stages.fitted)):
-            peaks = list(pool.map(partial(_climbed, stages.fitted[stage], options.iterations[stage], options), running))
-            if stage + 1 == len(stages.fitted):
+            last = stage + 1 == len(stages.fitted)
+            if stage > 0:
+                rough = stage + 2 < len(stages.fitted)
+                climbed = partial(_climbed, stages.fitted[stage], options.iterations[stage], options, rough)
+                peaks = list(pool.map(climbed, running))
+            if last:
                 break
-            chosen = _survivors([hypothesis for hypothesis, _ in running], peaks, options.survivors[stage])
+            chosen = _survivors(
+                [hypothesis for hypothesis, _ in running], peaks, options.survivors[stage], CLOSE[min(stage, 1)]
+            )
+            before = [peaks[k] for k in chosen]
             running = [
                 (
                     running[k][0],
-                    _apart(_ordered(peaks[k]).coordinates, running[k][0].spread, options.keep[stage + 1]),
+                    apart(_ordered(peaks[k]).coordinates, running[k][0].spread, options.keep[stage + 1]),
                 )
                 for k in chosen
             ]
-        return list(pool.map(lambda each: _judged(each[0][0], each[1], stages), zip(running, peaks, strict=True)))
+        done = zip(running, peaks, before, strict=True)
+        return [
+            Fitted(job[0], alone(peak), None, None, None if shorter is None else alone(shorter))
+            for job, peak, shorter in done
+        ]
 
 
-def _climbed(cuts: Cuts, iterations: int, options: DiagnoseOptions, job: tuple[Hypothesis, Array]) -> Peak:
-    return climb(Objective(job[0], cuts, options.sensor_floor), job[1], iterations=iterations)
+def _same(name: str, base: Fitted, options: DiagnoseOptions) -> bool:
+    """Tell whether an effect on a base is what some baseline is: a first wheel is no second one."""
+    wheels = [kind for kind in options.baseline if "wheel" in kind or "caster" in kind]
+    return name == "second_wheel" and bool(wheels) and "wheel_x" not in base.hypothesis.columns
+
+
+def _nuisance_slopes(base: Fitted, cuts: Cuts, options: DiagnoseOptions) -> Array:
+    """Return (W, R, NUISANCES) how starts and steady wrenches move a base's poses in windows."""
+    objective = Objective(base.hypothesis, cuts, options.sensor_floor)
+    return objective.linearise(base.peak.coordinates, objective.at_rest(1)).spread[0]
+
+
+def _first_look(cuts: Cuts, options: DiagnoseOptions, job: tuple[Hypothesis, Array], slopes: Array) -> Peak:
+    """Climb from the most promising starts of a hypothesis over the shortest windows."""
+    hypothesis, starts = job
+    objective = Objective(hypothesis, cuts, options.sensor_floor)
+    u, z = most_promising(objective, starts, slopes, options.keep[0])
+    spread = np.broadcast_to(slopes, (len(u), *slopes.shape))
+    return climb(objective, u, z, iterations=options.iterations[0], rough=True, spread=spread)
+
+
+def _climbed(cuts: Cuts, iterations: int, options: DiagnoseOptions, rough: bool, job: tuple[Hypothesis, Array]) -> Peak:
+    return climb(Objective(job[0], cuts, options.sensor_floor), job[1], iterations=iterations, rough=rough)
 
 
 def _ordered(peak: Peak) -> Peak:
     return peak.take(np.argsort(-peak.evidence, kind="stable"))
 
 
-def _judged(hypothesis: Hypothesis, peak: Peak, stages: Stages) -> Fitted:
-    best = peak.take(np.array([peak.best]))
-    score = held_out_score(best, 0, stages.heldout) if stages.heldout is not None else None
-    return Fitted(hypothesis, best, score)
-
-
-def _survivors(hypotheses: Sequence[Hypothesis], peaks: Sequence[Peak], most: int) -> list[int]:
+def _survivors(hypotheses: Sequence[Hypothesis], peaks: Sequence[Peak], most: int, close: float) -> list[int]:
     """Return which hypotheses go on: the likeliest of each of so many effects, and others that are as good."""
     evidence = np.array([float(np.nan_to_num(peak.evidence, nan=-np.inf).max()) for peak in peaks])
     best: dict[tuple[str, ...], float] = {}
     for hypothesis, value in zip(hypotheses, evidence, strict=True):
         best[hypothesis.effects] = max(best.get(hypothesis.effects, -np.inf), float(value))
-    ranked = sorted(best, key=lambda effects: -best[effects])[:most]
+    ranked = sorted(best, key=lambda effects: -best[effects])
+    # Over short windows little is told apart: where all are close, more go on.
+    ranked = [name for place, name in enumerate(ranked) if place < most or best[name] > best[ranked[0]] - close]
     return [
         k
         for k, hypothesis in enumerate(hypotheses)

@@ -4,10 +4,11 @@ In each window w the poses depend on the coordinates u and on nine nuisances z_w
 is constant over the window in the body's axes, of the size that a sensor's own error has; all with unit Gaussian
 priors. What is minimised is
 
-    sum_w (|r_w|^2 + |z_w|^2) / sigma^2 + |(u - m) / s|^2,
+    sum_w ((|r_w|^2 + |z_w|^2) / s_w^2 + 2 n_w ln s_w) + |(u - m) / s|^2,
 
-r_w the residuals over their noise. Linearised, each z_w is solved for and put back (Schur complement): what is left are
-normal equations in u alone. A scale sigma of at least one widens everything where a model leaves much unexplained.
+r_w the n_w residuals over their noise. Linearised, each z_w is solved for and put back (Schur complement): what is left
+are normal equations in u alone. A scale s_w of at least one, its best in each window, widens everything where a model
+leaves much unexplained: what no law has right, a knock, a foot that sticks, then counts for what it is and no more.
 """
 
 from __future__ import annotations
@@ -54,11 +55,13 @@ class Objective:
         hypothesis: what is free.
         cuts: W windows.
         floor: size of a sensor's own error [N]; as a torque, times the radius of gyration.
+        even: whether all windows have the same scale, as in a common least-squares fit.
     """
 
     hypothesis: Hypothesis
     cuts: Cuts
     floor: float
+    even: bool = False
 
     @property
     def observations(self) -> int:
@@ -91,25 +94,49 @@ class Objective:
         """
         return self._residual(self._simulated(self.hypothesis.rows(coordinates), nuisance))
 
+    @property
+    def counts(self) -> Array:
+        """Return (W,) how many numbers were observed in each window."""
+        return np.maximum(np.sum(self.cuts.weight > 0.0, axis=(1, 2)), 1).astype(float)
+
     def misfit(self, residual: Array, nuisance: Array) -> Array:
-        """Return (P,) the data's part: squares of residuals and nuisances."""
-        return np.sum(residual**2, axis=(1, 2)) + np.sum(nuisance**2, axis=(1, 2))
+        """Return (P, W) the data's part: squares of residuals and nuisances."""
+        return np.sum(residual**2, axis=2) + np.sum(nuisance**2, axis=2)
+
+    def weights(self, misfit: Array) -> Array:
+        """Return (P, W) one over the square of each window's scale: its best one that is at least one."""
+        counts = self.counts
+        if self.even:
+            misfit = np.broadcast_to(misfit.sum(axis=1, keepdims=True) / counts.sum() * counts, misfit.shape)
+        return 1.0 / np.maximum(1.0, misfit / counts)
+
+    def likelihood(self, misfit: Array) -> Array:
+        """Return (P,) log likelihoods at the windows' best scales, up to a constant of the windows [nat]."""
+        weight = self.weights(misfit)
+        return np.sum(-0.5 * misfit * weight + 0.5 * self.counts * np.log(weight), axis=1)
 
     def prior_misfit(self, coordinates: Array) -> Array:
         """Return (P,) squares of the coordinates over their prior."""
         return np.sum(((coordinates - self.hypothesis.mean) / self.hypothesis.spread) ** 2, axis=1)
 
-    def linearise(self, coordinates: Array, nuisance: Array) -> Linear:
-        """Take finite differences in every coordinate and nuisance, as many rows in one call as fit."""
+    def linearise(self, coordinates: Array, nuisance: Array, spread: Array | None = None) -> Linear:
+        """Take finite differences in every coordinate and nuisance, as many rows in one call as fit.
+
+        Args:
+            coordinates: (P, K).
+            nuisance: (P, W, NUISANCES).
+            spread: (P, W, R, NUISANCES) slopes in the nuisances from a point nearby; None: taken anew.
+        """
         count, free = coordinates.shape
         steps = step_sizes(self.hypothesis)
-        moves = 1 + free + NUISANCES
+        loose = NUISANCES if spread is None else 0
+        moves = 1 + free + loose
         u = np.repeat(coordinates, moves, axis=0).reshape(count, moves, free)
         z = np.repeat(nuisance, moves, axis=0).reshape(count, moves, *nuisance.shape[1:])
         for k in range(free):
             u[:, 1 + k, k] += steps[k]
         nuisance_steps = np.array([START_STEP] * START + [WRENCH_STEP] * WRENCH)
-        for k in range(NUISANCES):
+        for k in range(loose):
             z[:, 1 + free + k, :, k] += nuisance_steps[k]
         flat, flat_z = u.reshape(-1, free), z.reshape(-1, *nuisance.shape[1:])
         rows = self.hypothesis.rows(flat)
@@ -120,9 +147,9 @@ class Objective:
         residual = self._residual(found[:, 0])
         change = (found[:, 1:] - found[:, :1]) * self.cuts.weight
         change = np.clip(np.nan_to_num(change), -1e5, 1e5).reshape(count, moves - 1, len(self.cuts), -1)
-        change /= np.concatenate([steps, nuisance_steps])[:, None, None]
+        change /= np.concatenate([steps, nuisance_steps[:loose]])[:, None, None]
         change = np.moveaxis(change, 1, -1)
-        return Linear(residual, change[..., :free], change[..., free:])
+        return Linear(residual, change[..., :free], change[..., free:] if spread is None else spread)
 
 
 @dataclass(frozen=True)
@@ -130,8 +157,8 @@ class Reduced:
     """Normal equations with the nuisances put back.
 
     Attributes:
-        matrix: (P, K, K) of the data, not scaled by sigma, no prior.
-        vector: (P, K) likewise.
+        matrix: (P, W, K, K) of the data, not scaled, no prior.
+        vector: (P, W, K) likewise.
         gain: (P, W, NUISANCES, K) how the best nuisances follow the coordinates.
         shift: (P, W, NUISANCES) step of the nuisances for no step of the coordinates.
         log_det: (P,) log determinants of the nuisances' matrices, summed.
@@ -142,6 +169,18 @@ class Reduced:
     gain: Array
     shift: Array
     log_det: Array
+
+    def weighed(self, weight: Array) -> tuple[Array, Array]:
+        """Return matrix (P, K, K) and vector (P, K) with a weight (P, W) for each window."""
+        return np.einsum("pw,pwkl->pkl", weight, self.matrix), np.einsum("pw,pwk->pk", weight, self.vector)
+
+
+def nuisance_step(spread: Array, residual: Array, nuisance: Array) -> Array:
+    """Return the step (P, W, NUISANCES) to the best nuisances for slopes (P, W, R, NUISANCES), coordinates kept."""
+    spread_t = np.swapaxes(spread, -1, -2)
+    pull = (spread_t @ residual[..., None])[..., 0] - nuisance
+    step = np.linalg.solve(spread_t @ spread + np.eye(NUISANCES), pull[..., None])[..., 0]
+    return np.asarray(step, dtype=np.float64)
 
 
 def reduce(linear: Linear, nuisance: Array) -> Reduced:
@@ -154,8 +193,7 @@ def reduce(linear: Linear, nuisance: Array) -> Reduced:
     solved = np.linalg.solve(inner, np.concatenate([cross, pull[..., None]], -1))
     gain, shift = solved[..., :-1], solved[..., -1]
     cross_t = np.swapaxes(cross, -1, -2)
-    matrix = np.sum(slope_t @ linear.slope - cross_t @ gain, axis=1)
-    along = (slope_t @ linear.residual[..., None])[..., 0]
-    vector = np.sum(along - (cross_t @ shift[..., None])[..., 0], axis=1)
+    matrix = slope_t @ linear.slope - cross_t @ gain
+    vector = (slope_t @ linear.residual[..., None])[..., 0] - (cross_t @ shift[..., None])[..., 0]
     _, log_det = np.linalg.slogdet(inner)
     return Reduced(0.5 * (matrix + np.swapaxes(matrix, -1, -2)), vector, gain, shift, np.sum(log_det, axis=1))

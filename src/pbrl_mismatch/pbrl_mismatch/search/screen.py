@@ -19,10 +19,10 @@ from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
 
 Array = NDArray[np.float64]
 
-STRIDE = 5
+STRIDE = 8
 """Steps between the moments that are compared."""
-STRETCH = (0.1, 6.0)
-"""A draw's strength is changed by at most this much to fit."""
+STRETCH = (0.02, 10.0)
+"""A strength whose sign is known is solved for within these bounds, in units of its prior's centre."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,9 @@ class Lacking:
 def screen(lacking: Lacking, hypothesis: Hypothesis, effect: Effect, coordinates: Array) -> tuple[Array, Array]:
     """Rank draws by how well they explain what is lacking.
 
+    What an effect's wrench is proportional to is not drawn but solved for, given the rest of each draw (variable
+    projection, Golub and Pereyra 1973).
+
     Args:
         lacking: the residual under the baseline.
         hypothesis: the baseline with the effect.
@@ -61,7 +64,7 @@ def screen(lacking: Lacking, hypothesis: Hypothesis, effect: Effect, coordinates
         coordinates: (n, K) draws; the baseline's own coordinates as they are in the baseline.
 
     Returns:
-        The draws with their strength adapted (n, K), and their misfits (n,), lower is better.
+        The draws with their strengths adapted (n, K), and their misfits (n,), lower is better.
     """
     stride = 1 if effect.remembers else STRIDE
     track = lacking.track
@@ -79,26 +82,46 @@ def screen(lacking: Lacking, hypothesis: Hypothesis, effect: Effect, coordinates
     start = felt(base)
     own = (felt(lacking.baseline.rows(moved)) - start) / steps[:, None] * lacking.baseline.spread[:, None]
     target = np.einsum("nij,nj->ni", whiten, wanted).reshape(-1)
-    changes = felt(hypothesis.rows(coordinates)) - start
     # What the baseline's parameters could do is taken out, as far as their priors let them.
     inner = np.linalg.inv(own @ own.T + np.eye(len(own)))
 
     def rest(values: Array) -> Array:
         return values - (values @ own.T) @ inner @ own
 
-    target, changes = rest(target[None])[0], rest(changes)
-    power, along = np.sum(changes**2, axis=1) + 1e-9, changes @ target
-    out = coordinates.copy()
-    stretch = np.ones(len(coordinates))
+    target = rest(target[None])[0]
     columns = hypothesis.columns
     linear = [columns.index(name) for name in effect.linear if name in columns]
-    if linear:
-        both = all(not hypothesis.parameters[k].positive for k in linear)
-        raw = along / power
-        stretch = np.sign(raw) * np.clip(np.abs(raw), *STRETCH) if both else np.clip(raw, *STRETCH)
-        for k in linear:
-            is_log = hypothesis.parameters[k].positive
-            out[:, k] = out[:, k] + np.log(np.abs(stretch)) if is_log else out[:, k] * stretch
-    misfit = np.sum(target**2) - 2.0 * stretch * along + stretch**2 * power
+    out = coordinates.copy()
+    if not linear:
+        changes = rest(felt(hypothesis.rows(coordinates)) - start)
+        misfit = np.sum((target - changes) ** 2, axis=1)
+    else:
+        parts = np.stack([rest(felt(_alone(hypothesis, coordinates, linear, k)) - start) for k in linear], 1)
+        strength = _strengths(parts, target, np.array([hypothesis.parameters[k].positive for k in linear]))
+        misfit = np.sum((target - np.einsum("nl,nlt->nt", strength, parts)) ** 2, axis=1)
+        for index, k in enumerate(linear):
+            parameter = hypothesis.parameters[k]
+            size = strength[:, index]
+            out[:, k] = parameter.mean + np.log(size) if parameter.positive else parameter.spread * size
     outside = np.sum(((out - hypothesis.mean) / hypothesis.spread) ** 2, axis=1)
     return out, misfit + outside
+
+
+def _alone(hypothesis: Hypothesis, coordinates: Array, linear: list[int], one: int) -> Array:
+    """Return parameter rows of draws in which one strength has its unit, the prior's own, and the others are off."""
+    rows = hypothesis.rows(coordinates)
+    for k in linear:
+        parameter = hypothesis.parameters[k]
+        unit = parameter.centre if parameter.positive else parameter.spread
+        rows[:, COLUMN[parameter.column]] = unit if k == one else 0.0
+    return rows
+
+
+def _strengths(parts: Array, target: Array, positive: NDArray[np.bool_]) -> Array:
+    """Return how much of each part (n, L, T) explains a target (T,), in units (n, L); some only within `STRETCH`."""
+    matrix = parts @ np.swapaxes(parts, -1, -2)
+    along = parts @ target
+    # A prior of one unit about none, or about one where the sign is known, keeps what is not seen small.
+    centre = positive.astype(float)
+    found = np.linalg.solve(matrix + np.eye(len(positive)), (along + centre)[..., None])[..., 0]
+    return np.where(positive, np.clip(found, *STRETCH), found)

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_mismatch.search.library import Fitted
+from pbrl_mismatch.search.fitted import Fitted
 
-VETO = 3.0
-"""A hypothesis that predicts held-out windows worse than the baseline by this much [nat] is not named."""
+VETO, VETO_SHARE = 8.0, 0.05
+"""A hypothesis that predicts held-out windows worse than the baseline by this much [nat], and this share of what its
+evidence gained, is not named."""
+DISCREPANCY = 0.15
+"""Share of what a law explains that its being wrong may leave for others to explain."""
+JUDGED = 3
+"""So many of the likeliest are held against held-out windows at most."""
 
 
 @dataclass(frozen=True)
@@ -49,19 +54,48 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
     for fitted in tried:
         groups.setdefault(tuple(sorted(fitted.hypothesis.effects)), []).append(fitted)
     singles = max(sum(len(key) == 1 for key in groups), 1)
-    before = bases[0].score.log_score if bases[0].score else None
-    names, best, weights, vetoes = [], [], [], []
+    none = max(base.evidence for base in bases)
+    entries = []
     for key, members in groups.items():
         evidence = np.array([member.evidence for member in members])
         finite = np.where(np.isfinite(evidence), evidence, -np.inf)
-        top = int(np.argmax(finite))
         prior = math.log(options.none_odds) if not key else -len(key) * math.log(singles)
-        names.append(key)
-        best.append(members[top])
-        weights.append(prior + float(np.logaddexp.reduce(finite)) - math.log(len(members)))
-        score = members[top].score
-        vetoes.append(bool(key) and before is not None and score is not None and score.log_score < before - VETO)
-    weight = np.array(weights) - np.where(vetoes, VETO, 0.0)
+        weight = prior + float(np.logaddexp.reduce(finite)) - math.log(len(members))
+        if len(key) > 1:
+            # A law that is a little wrong leaves a share of what it explains, which any other effect may take.
+            parts = [set(other) for other in groups if other and set(other) < set(key)]
+            known = [max(m.evidence for m in groups[tuple(sorted(part))]) for part in parts]
+            weight -= DISCREPANCY * max(max(known, default=none) - none, 0.0)
+        entries.append(Weighed(key, members[int(np.argmax(finite))], weight, 0.0, False))
+    return _ordered(entries)
+
+
+def veto(weighed: Sequence[Weighed], baseline: Fitted, judge: Callable[[Fitted], Fitted]) -> tuple[Weighed, ...]:
+    """Return hypotheses with the likeliest held against what was held out of their fit.
+
+    One that predicts it worse than the baseline loses what it predicts worse.
+
+    Args:
+        weighed: hypotheses, likeliest first.
+        baseline: judged.
+        judge: gives a fitted hypothesis its score.
+    """
+    found = list(weighed)
+    for rank, best in enumerate(weighed[:JUDGED]):
+        if not best.effects or baseline.score is None:
+            break
+        fitted = judge(best.fitted)
+        short = baseline.score.log_score - fitted.score.log_score if fitted.score else 0.0
+        vetoed = short > VETO + VETO_SHARE * max(fitted.evidence - baseline.evidence, 0.0)
+        found[rank] = replace(best, fitted=fitted, vetoed=vetoed, log_weight=best.log_weight - max(short, 0.0))
+        if not vetoed:
+            break
+    return _ordered(found)
+
+
+def _ordered(entries: Sequence[Weighed]) -> tuple[Weighed, ...]:
+    """Return entries likeliest first, with their probabilities among all."""
+    weight = np.array([each.log_weight for each in entries])
     share = np.exp(weight - np.logaddexp.reduce(weight))
     order = np.argsort(-weight, kind="stable")
-    return tuple(Weighed(names[k], best[k], float(weight[k]), float(share[k]), vetoes[k]) for k in order)
+    return tuple(replace(entries[k], probability=float(share[k])) for k in order)

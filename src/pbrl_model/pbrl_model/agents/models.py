@@ -22,6 +22,7 @@ from pbrl_model.baselines.local import LocallyWeightedRegression
 from pbrl_model.baselines.object_oriented import ObjectOrientedRegression
 from pbrl_model.baselines.sectors import ContactSectors
 from pbrl_model.parameters import BodyParameters
+from pbrl_model.posterior import Posterior
 from pbrl_model.prior_options import GroundOptions, PriorOptions
 from pbrl_model.transitions.data import Transitions, concatenate, displacements
 from pbrl_model.transitions.model import LearnOptions, TransitionPosterior, learn, update
@@ -74,6 +75,35 @@ class TrueModel:
     def ends(self, actions: ActionSet) -> Array:
         """Return (A, 3) where pushes end."""
         return push_ends(self._thing, self._parameters.to_vector()[None], actions)[0]
+
+
+class LearnedModel:
+    """A posterior that was learned before, such as `load_posterior` reads from a repaired model's file.
+
+    Args:
+        thing: the body.
+        posterior: of it.
+    """
+
+    def __init__(self, thing: Thing, posterior: Posterior) -> None:
+        rows = posterior.rows()
+        self._thing, self._rows = thing, rows[:: max(1, len(rows) // PLANNING_DRAWS)][:PLANNING_DRAWS]
+
+    @property
+    def ready(self) -> bool:
+        """There is nothing more to learn."""
+        return True
+
+    def observe(self, push: Push) -> None:
+        """Take no notice."""
+
+    def motions(self, actions: ActionSet) -> Motions:
+        """Return the posterior's mean of what each push does."""
+        return expected_motions(self._thing, self._rows, actions)[0]
+
+    def ends(self, actions: ActionSet) -> Array:
+        """Return (A, 3) the posterior's mean of where pushes end."""
+        return push_ends(self._thing, self._rows, actions).mean(axis=0)
 
 
 class PhysicsModel:

@@ -1,0 +1,127 @@
+"""When the effects of a fitted model act: the times at which its wrench with and without each of them part.
+
+A tether pulls only while it is taut, a patch rubs only while a foot is on it, a post pushes only while it is touched;
+none of them has a parameter that says when. So the fitted law is asked: along the recorded motion, the body's
+acceleration is taken twice, with the effect's columns as they were fitted and with them off. Times the mass, the
+difference is what the effect did at that moment.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.data.residual import accelerations
+from pbrl_mismatch.data.track import Track
+from pbrl_mismatch.effects.registry import effect_named
+from pbrl_mismatch.errors import MismatchError
+from pbrl_mismatch.kernels.columns import COLUMN, WIDTH, neutral_row
+from pbrl_mismatch.search.fitted import scene_of
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+FLOOR = 0.2
+"""A wrench below this is not told from a wrist sensor's own error [N]; a torque counts over the radius of gyration."""
+SHARE = 0.03
+"""Nor does one below this share of the effect's own strong moments count: laws have tails."""
+STRONG = 0.95
+"""Quantile of an effect's sizes that are above the floor which is its strong moment."""
+GAP, LEAST = 0.3, 0.05
+"""Pauses shorter than the first are bridged, bouts shorter than the second dropped [s]."""
+UNSEEN_IN_FORCE = frozenset({"pose_bias", "time_offset", "grasp_compliance"})
+"""Effects on what is seen, not on what moves: they act whenever the body is observed."""
+
+
+def activity(
+    track: Track, row: Array, effects: Sequence[str], *, floor: float = FLOOR
+) -> dict[str, tuple[Interval, ...] | None]:
+    """Return when each effect of a fitted model acts.
+
+    Args:
+        track: what was recorded.
+        row: (WIDTH,) parameter row of the fitted model, the effects on.
+        effects: names of those that are asked about.
+        floor: size below which a wrench does not count [N].
+
+    Returns:
+        By effect the intervals (start, end) [s] in order, none where it never reaches the floor; None for effects that
+        no force shows, which act for as long as anybody looks.
+
+    Raises:
+        MismatchError: an effect is unknown, the row does not fit, or the floor is not above zero.
+    """
+    if not (math.isfinite(floor) and floor > 0.0):
+        raise MismatchError(f"activity: expected a floor above zero, got {floor}")
+    sizes = wrench_sizes(track, row, effects)
+    return {name: None if size is None else intervals(track, _counts(size, floor)) for name, size in sizes.items()}
+
+
+def wrench_sizes(track: Track, row: Array, effects: Sequence[str]) -> dict[str, Array | None]:
+    """Return how hard each effect of a fitted model acts, (T,) [N]; None for those that no force shows.
+
+    Args:
+        track: what was recorded, in T steps.
+        row: (WIDTH,) parameter row.
+        effects: names.
+
+    Raises:
+        MismatchError: an effect is unknown, or the row does not fit.
+    """
+    if row.shape != (WIDTH,):
+        raise MismatchError(f"activity: expected a row of {WIDTH} columns, got shape {row.shape}")
+    shown = [name for name in effects if effect_named(name).name not in UNSEEN_IN_FORCE]
+    found: dict[str, Array | None] = dict.fromkeys(effects)
+    if not shown:
+        return found
+    rows = np.stack([row, *(without(track, row, name) for name in shown)])
+    acceleration = accelerations(track, rows, track.seen, 1)
+    mass = float(row[COLUMN["mass"]])
+    change = mass * (acceleration[0] - acceleration[1:]) * [1.0, 1.0, track.gyration]
+    size = np.sqrt(np.sum(np.nan_to_num(change, nan=0.0, posinf=0.0, neginf=0.0) ** 2, axis=-1))
+    return found | dict(zip(shown, size, strict=True))
+
+
+def without(track: Track, row: Array, effect: str) -> Array:
+    """Return (WIDTH,) a model's row with one of its effects off, all else as it was fitted."""
+    known = effect_named(effect)
+    columns = {parameter.column for parameter in known.parameters(scene_of(track, row))}
+    columns.update(known.fixed, *known.fixed_in.values())
+    off, neutral = row.copy(), neutral_row()
+    for column in columns:
+        off[COLUMN[column]] = neutral[COLUMN[column]]
+    return off
+
+
+def intervals(track: Track, acting: NDArray[np.bool_]) -> tuple[Interval, ...]:
+    """Return the bouts of a mask (T,) over a track's steps as (start, end) [s], episode by episode.
+
+    Raises:
+        MismatchError: the mask does not fit the track.
+    """
+    if acting.shape != track.clock.shape:
+        raise MismatchError(f"activity: expected a mask of {len(track.clock)} steps, got shape {acting.shape}")
+    found: list[Interval] = []
+    for begin, last in zip(track.begin, track.last, strict=True):
+        mask = acting[begin : last + 1].astype(np.int8)
+        edges = np.diff(np.concatenate([[0], mask, [0]]))
+        starts, ends = np.flatnonzero(edges > 0) + begin, np.flatnonzero(edges < 0) + begin
+        bouts: list[list[float]] = []
+        for start, end in zip(starts, ends, strict=True):
+            first, until = float(track.clock[start]), float(track.clock[end - 1]) + track.dt
+            if bouts and first - bouts[-1][1] < GAP:
+                bouts[-1][1] = until
+            else:
+                bouts.append([first, until])
+        found += [(first, until) for first, until in bouts if until - first >= LEAST]
+    return tuple(found)
+
+
+def _counts(size: Array, floor: float) -> NDArray[np.bool_]:
+    """Return (T,) where a size is above the floor and is no mere tail of the effect's strong moments."""
+    above = size[size > floor]
+    strong = float(np.quantile(above, STRONG)) if len(above) else 0.0
+    return size > max(floor, SHARE * strong)

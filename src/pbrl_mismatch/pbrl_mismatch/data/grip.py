@@ -1,0 +1,120 @@
+"""How a gripper moves against what it holds: the place where it holds on, seen from the body, beside what is felt.
+
+The motion of a body under a felt wrench is the same however softly it is held. What the hold gives way is seen between
+the gripper's pose and the body's. The body's smoothed pose is off for some readings in a row, so that readings are
+taken together in groups whose errors are nearly their own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_bag.types import Grasp, PoseStream, Recording
+from pbrl_mismatch.data.track import Track
+from pbrl_model.sensing.motion import Motion
+
+Array = NDArray[np.float64]
+
+MARGIN = 0.3
+"""Left out at both ends of a grasp, while plates close and open [s]."""
+FIRST = 0.6
+"""The gripper's own point that holds on is where the contact is in this time from the start [s]."""
+LEAST = 20
+"""Readings of a grasp that are worth a look."""
+TOGETHER = 0.6
+"""Readings within so long are one: the errors of the body's smoothed pose are their own after about that time [s]."""
+
+
+@dataclass(frozen=True)
+class GripTrack:
+    """N means of readings of grippers while they held an object.
+
+    Attributes:
+        grasp: (N,) which grasp each belongs to, from zero.
+        time: (N,) [s].
+        place: (N, 2) of the gripper's point that holds on, less the contact, in the body's frame [m].
+        heading: (N,) of the body [rad].
+        turn: (N,) of the gripper against the body [rad]: an edge turns between its plates.
+        force: (N, 2) felt, in the body's axes [N].
+        velocity: (N, 2) of the contact, in the body's axes [m/s].
+    """
+
+    grasp: NDArray[np.int64]
+    time: Array
+    place: Array
+    heading: Array
+    turn: Array
+    force: Array
+    velocity: Array
+
+
+def lay_grips(recording: Recording, track: Track) -> GripTrack | None:
+    """Return how grippers moved against an object; None where no gripper was seen.
+
+    Only grasps by one gripper count: with two, who feels what is not known apart.
+
+    Args:
+        recording: with the grippers' poses.
+        track: of the object.
+    """
+    parts: list[tuple[Array, ...]] = []
+    for episode, motion in enumerate(track.motions):
+        gripper = motion.grippers[0]
+        stream = recording.gripper_poses.get(gripper)
+        if len(motion.grippers) != 1 or stream is None:
+            continue
+        grasps = [each for each in recording.grasps if each.gripper == gripper and each.object == track.object]
+        grasp = min(grasps, key=lambda each: abs(each.start - motion.time[0]))
+        found = _readings(track, episode, motion, grasp, stream)
+        if found is not None:
+            parts.append(found)
+    if not parts:
+        return None
+    number = np.concatenate([np.full(len(part[0]), k) for k, part in enumerate(parts)])
+    return GripTrack(number.astype(np.int64), *(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def _readings(track: Track, episode: int, motion: Motion, grasp: Grasp, stream: PoseStream) -> tuple[Array, ...] | None:
+    rows = slice(int(track.begin[episode]), int(track.last[episode]) + 1)
+    clock = track.clock[rows]
+    keep = (stream.time > clock[0] + MARGIN) & (stream.time < clock[-1] - MARGIN)
+    if keep.sum() < LEAST:
+        return None
+    time, gripper = stream.time[keep], stream.position[keep][:, :2]
+    turn = _yaw(stream.quaternion[keep])
+    state = np.stack([np.interp(time, clock, track.seen[rows, k]) for k in range(6)], -1)
+    mount, felt = track.mount[rows], track.felt[rows]
+    world = np.stack([mount[:, 0] * felt[:, 0] - mount[:, 1] * felt[:, 1]], -1)
+    world = np.column_stack([world, mount[:, 1] * felt[:, 0] + mount[:, 0] * felt[:, 1]])
+    force = np.stack([np.interp(time, clock, world[:, k]) for k in range(2)], -1)
+    lever = _turned(state[:, 2], np.broadcast_to(grasp.contact[:2] - track.body[1:3], (len(time), 2)))
+    early = time < time[0] + FIRST
+    hold = _turned(-turn, state[:, :2] + lever - gripper)[early].mean(axis=0)
+    there = gripper + _turned(turn, np.broadcast_to(hold, gripper.shape))
+    place = _turned(-state[:, 2], there - state[:, :2] - lever)
+    speed = state[:, 3:5] + state[:, 5:] * np.column_stack([-lever[:, 1], lever[:, 0]])
+    columns = (time, place, state[:, 2], turn - state[:, 2], _turned(-state[:, 2], force), _turned(-state[:, 2], speed))
+    return tuple(_together(time, each) for each in columns)
+
+
+def _together(time: Array, values: Array) -> Array:
+    """Return the means of values (n, ...) within spans of `TOGETHER`, empty spans left out."""
+    _, span, count = np.unique(((time - time[0]) / TOGETHER).astype(np.int64), return_inverse=True, return_counts=True)
+    sums = np.zeros((len(count), *values.shape[1:]))
+    np.add.at(sums, span, values)
+    return sums / count.reshape(-1, *(1 for _ in values.shape[1:]))
+
+
+def _turned(angle: Array, vectors: Array) -> Array:
+    """Return vectors (n, 2) turned by angles (n,) [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.column_stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]])
+
+
+def _yaw(quaternion: Array) -> Array:
+    """Return the turns (n,) about the vertical [rad] of quaternions (n, 4), x y z w, without jumps."""
+    x, y, z, w = quaternion.T
+    return np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))

@@ -1,0 +1,1 @@
+"""The push that would tell the surviving hypotheses apart."""

@@ -1,0 +1,1 @@
+"""Which effects a recording could not have shown."""

@@ -1,0 +1,141 @@
+"""What one window says for a wrench that the model does not have: a Bayes factor, which is an e-value.
+
+In a window the poses, over their noise and linearised, are
+
+    r = S z + A d + B w + n,    z, d, n Gaussian,
+
+with the nuisances z of `search.objective` (the start, the sensor's own error), what is not known of the parameters, d,
+and a wrench w that is straight between three knots. Under the model w is nothing; otherwise each knot has forces of
+the order tau along each axis. With the scale of the noise known only from the windows before, both densities are of
+Student's form, and their ratio is the evidence. Its mean is one if the model is right, whatever came before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.data.simulation import poses
+from pbrl_mismatch.search.objective import NUISANCES, Objective
+from pbrl_mismatch.search.predictive import KNOTS, TEST_STEP
+
+Array = NDArray[np.float64]
+
+ROUNDS = 3
+"""Linearisations in the nuisances: the start is far enough from its guess to stick or slip."""
+FIRST_FREEDOM, MOST_FREEDOM = 20.0, 400.0
+"""Numbers that the scale of the noise is worth before the first window, and at most."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """One window linearised under one reading, whitened by all that is noise or not known.
+
+    Attributes:
+        residual: (n,) of unit variance and independent if the model is right.
+        slope: (n, K) of the parameters' coordinates, whitened likewise.
+        strength: (D,) how many standard deviations the wrench of one newton (a radius of gyration away for a torque)
+            moves the poses, along D directions that are independent of each other.
+        explained: (D,) parts of the residual along those directions.
+    """
+
+    residual: Array
+    slope: Array
+    strength: Array
+    explained: Array
+
+    @property
+    def rest(self) -> float:
+        """Return the squares that no wrench explains."""
+        return max(float(self.residual @ self.residual - self.explained @ self.explained), 0.0)
+
+    @property
+    def freedom(self) -> int:
+        """Return how many numbers no wrench explains."""
+        return len(self.residual) - len(self.explained)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What is known of the scale of the noise: `squares / freedom` is its variance over what was thought."""
+
+    freedom: float = FIRST_FREEDOM
+    squares: float = FIRST_FREEDOM
+
+    @property
+    def scale(self) -> float:
+        """Return the standard deviation over what was thought."""
+        return float(np.sqrt(self.squares / self.freedom))
+
+    def with_window(self, window: Window) -> Noise:
+        """Return it after one window more; old ones fade."""
+        freedom, squares = self.freedom + window.freedom, self.squares + window.rest
+        fade = min(1.0, MOST_FREEDOM / freedom)
+        return Noise(fade * freedom, fade * squares)
+
+
+def look(objective: Objective, coordinates: Array, covariance: Array) -> Window:
+    """Linearise and whiten the single window of an objective.
+
+    Args:
+        objective: a model over one window.
+        coordinates: (K,) where the parameters are thought to be.
+        covariance: (K, K) how well.
+    """
+    u = coordinates[None]
+    z = objective.at_rest(1)
+    linear = objective.linearise(u, z)
+    for _ in range(ROUNDS - 1):
+        spread, residual = linear.spread[0, 0], linear.residual[0, 0]
+        z = z + np.linalg.solve(spread.T @ spread + np.eye(NUISANCES), spread.T @ residual - z[0, 0])
+        linear = objective.linearise(u, z)
+    seen = objective.cuts.weight[0].reshape(-1) > 0.0
+    spread, slope = linear.spread[0, 0][seen], linear.slope[0, 0][seen]
+    centred = linear.residual[0, 0][seen] + spread @ z[0, 0]
+    noise = np.eye(len(centred)) + spread @ spread.T
+    lower = np.linalg.cholesky(noise + slope @ covariance @ slope.T)
+    push = _pushes(objective, u, z)[:, seen].T
+    left, strength, _ = np.linalg.svd(np.linalg.solve(lower, push), full_matrices=False)
+    residual = np.linalg.solve(lower, centred)
+    return Window(residual, np.linalg.solve(lower, slope), strength, left.T @ residual)
+
+
+def _pushes(objective: Objective, u: Array, z: Array) -> Array:
+    """Return (3 KNOTS, R) how the poses over noise follow each knot of a wrench, for a newton."""
+    cuts, gyration = objective.cuts, objective.cuts.track.gyration
+    unit = np.array([1.0, 1.0, gyration])
+    told = cuts.told + np.einsum("wkl,wl->wk", cuts.root, z[0, :, :6])
+    count = 1 + 3 * KNOTS
+    extra = np.tile((z[0, :, 6:] * objective.floor * unit)[None, :, None, :], (count, 1, KNOTS, 1))
+    for k in range(3 * KNOTS):
+        extra[1 + k, :, k // 3, k % 3] += TEST_STEP * unit[k % 3]
+    rows = np.repeat(objective.hypothesis.rows(u), count, 0)
+    found = poses(rows, cuts, np.repeat(told[None], count, 0), extra)
+    return ((found[1:] - found[:1]) * cuts.weight / TEST_STEP).reshape(3 * KNOTS, -1)
+
+
+def log_e_value(window: Window, noise: Noise, forces: tuple[float, ...]) -> float:
+    """Return the logarithm of the evidence for a left-out wrench, sizes of it weighed alike.
+
+    Args:
+        window: whitened.
+        noise: known from windows before.
+        forces: sizes tau [N].
+    """
+    squares = float(window.residual @ window.residual)
+    freedom = noise.freedom + len(window.residual)
+    found = []
+    for tau in forces:
+        ratio = (tau * window.strength) ** 2
+        left = squares - float(np.sum(window.explained**2 * ratio / (1.0 + ratio)))
+        gain = np.log((noise.squares + squares) / (noise.squares + max(left, 0.0)))
+        found.append(0.5 * freedom * gain - 0.5 * float(np.sum(np.log1p(ratio))))
+    return float(np.logaddexp.reduce(found) - np.log(len(found)))
+
+
+def adjusted(window: Window, coordinates: Array, covariance: Array) -> tuple[Array, Array]:
+    """Return coordinates (K,) and covariance (K, K) after a window that the model has foretold (Kalman's update)."""
+    gain = covariance @ window.slope.T
+    return coordinates + gain @ window.residual, covariance - gain @ gain.T

@@ -1,0 +1,70 @@
+"""Stretches of a recording: what had been heard by a moment, and the last of it for a diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_bag.types import PoseStream, Recording, WrenchStream
+
+BEFORE = 2.5
+"""Kept before a grasp [s]: weight and bias of a wrist are read there, and the smoother looks back."""
+AFTER = 0.5
+"""And after its beginning [s]."""
+
+
+def between(recording: Recording, start: float, end: float) -> Recording:
+    """Return what was heard from one time to another [s]; a hold that still lasts then ends there.
+
+    Samples around the beginning of a hold that began earlier and lasts are kept, for its reference reading.
+
+    Args:
+        recording: all of it.
+        start: [s].
+        end: [s].
+    """
+    lasting = [g.start for g in recording.grasps if g.start < start < g.end and g.start <= end]
+
+    def kept(time: NDArray[np.float64]) -> NDArray[np.int64]:
+        first, last = np.searchsorted(time, start, "left"), np.searchsorted(time, end, "right")
+        rows = [np.arange(first, last)]
+        for began in lasting:
+            from_, to = np.searchsorted(time, [began - BEFORE, min(began + AFTER, end)])
+            rows.append(np.arange(from_, min(to, first)))
+        return np.unique(np.concatenate(rows))
+
+    def poses(stream: PoseStream) -> PoseStream:
+        rows = kept(stream.time)
+        return PoseStream(stream.time[rows], stream.position[rows], stream.quaternion[rows])
+
+    def wrenches(stream: WrenchStream) -> WrenchStream:
+        rows = kept(stream.time)
+        return replace(stream, time=stream.time[rows], force=stream.force[rows], torque=stream.torque[rows])
+
+    return replace(
+        recording,
+        object_poses={name: poses(stream) for name, stream in recording.object_poses.items()},
+        gripper_poses={name: poses(stream) for name, stream in recording.gripper_poses.items()},
+        wrenches={name: wrenches(stream) for name, stream in recording.wrenches.items()},
+        grasps=tuple(
+            replace(grasp, end=min(grasp.end, end))
+            for grasp in recording.grasps
+            if grasp.start < end and grasp.end > start
+        ),
+    )
+
+
+def last_holds(recording: Recording, name: str, seconds: float) -> Recording:
+    """Return the last holds of an object that last so long together [s], each whole, with what comes before them.
+
+    A hold is never cut: its reference reading lies before its beginning.
+    """
+    end = max((g.end for g in recording.grasps if g.object == name), default=0.0)
+    start, total = end, 0.0
+    for grasp in sorted((g for g in recording.grasps if g.object == name), key=lambda g: -g.end):
+        if total >= seconds:
+            break
+        start, total = min(start, grasp.start), total + grasp.end - grasp.start
+    return between(recording, start - BEFORE, end + 1.0)

@@ -1,0 +1,105 @@
+"""The sequential test of one model of one object: a Shiryaev-Roberts sum of e-values on every grid of windows.
+
+R grows as R <- (1 + R) e. With E[e] = 1 under the model, R minus the number of windows is a martingale, so that R is
+above c somewhere in n windows with a chance of at most n / c (Doob), and it forgets a quiet past by itself: the sum is
+that of the likelihood ratios of every moment at which a mismatch may have begun. Shin, Ramdas and Rinaldo,
+*E-detectors* (2023); Roberts (1966).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pbrl_mismatch.data.cuts import Cuts
+from pbrl_mismatch.online.evidence import Noise, Window, adjusted, log_e_value, look
+from pbrl_mismatch.online.options import MonitorOptions
+from pbrl_mismatch.online.reading import Reading
+from pbrl_mismatch.online.windows import Grid
+from pbrl_mismatch.search.objective import Objective
+
+CALM = float(np.log(3.0))
+"""A statistic below this (logarithm) is nothing to think of: the windows behind it have been foretold."""
+
+
+def grown(statistic: float, value: float) -> float:
+    """Return the logarithm of R after a window, R <- (1 + R) e.
+
+    Args:
+        statistic: logarithm of R before.
+        value: logarithm of the window's e-value.
+    """
+    return float(np.logaddexp(0.0, statistic)) + value
+
+
+@dataclass
+class ReadingTest:
+    """The test of one reading of a model; it adjusts its parameters by windows that it has foretold.
+
+    Attributes:
+        reading: of the posterior.
+        options: of the watch.
+        noise: known so far.
+        statistic: logarithm of R by grid.
+        size: times the noise that the last windows' poses were off along what a wrench would do, by grid.
+    """
+
+    reading: Reading
+    options: MonitorOptions
+    noise: Noise = field(default_factory=Noise)
+    statistic: dict[Grid, float] = field(default_factory=dict)
+    size: dict[Grid, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.coordinates, self.covariance = self.reading.mean.copy(), self.reading.covariance.copy()
+        self._waiting: deque[tuple[float, Cuts]] = deque()
+
+    @property
+    def highest(self) -> float:
+        """Return the logarithm of the largest statistic."""
+        return max(self.statistic.values(), default=-np.inf)
+
+    def seen(self, cuts: Cuts) -> Window:
+        """Return a window as this reading sees it."""
+        first, steps = int(cuts.span[0, 0]), int(cuts.span[0, 1])
+        force = float(np.sqrt(np.mean(np.sum(cuts.track.felt[first : first + steps, :2] ** 2, axis=1))))
+        floor = float(np.hypot(self.options.sensor_floor, self.options.sensor_share * force))
+        objective = Objective(self.reading.hypothesis, cuts, floor)
+        return look(objective, self.coordinates, self.covariance)
+
+    def take(self, grid: Grid, cuts: Cuts, end: float, *, counts: bool) -> float:
+        """Take in a window.
+
+        Args:
+            grid: that it belongs to.
+            cuts: the window alone.
+            end: of it [s].
+            counts: False: adjust only.
+
+        Returns:
+            Logarithm of its e-value.
+        """
+        window = self.seen(cuts)
+        value = log_e_value(window, self.noise, self.options.forces)
+        self.size[grid] = float(np.sqrt(np.mean(window.explained**2))) if len(window.explained) else 0.0
+        if counts:
+            self.statistic[grid] = grown(self.statistic.get(grid, -np.inf), value)
+        if grid == (max(self.options.windows), 0):
+            self._waiting.append((end, cuts))
+            self.noise = self.noise.with_window(window)
+        return value
+
+    def settle(self, now: float) -> None:
+        """Learn from the windows that lie so far back that no window to come overlaps them."""
+        if self.highest > CALM:
+            return
+        while self._waiting and self._waiting[0][0] <= now - max(self.options.windows) + 1e-6:
+            window = self.seen(self._waiting.popleft()[1])
+            self.coordinates, self.covariance = adjusted(window, self.coordinates, self.covariance)
+
+    def forget(self) -> None:
+        """Begin the statistics anew."""
+        self.statistic.clear()
+        self._waiting.clear()

@@ -1,0 +1,114 @@
+"""Raises `/mismatches` as soon as an object's model no longer foretells what is heard, and says why a little later."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import rclpy
+from pbrl_msgs.msg import Mismatches, ObjectModels
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from pbrl_bag.errors import BagError
+from pbrl_bag.ros.parameters import declare, refuse_unknown
+from pbrl_bag.ros.stopping import init_until_signal, spin_until
+from pbrl_mismatch.errors import MismatchError
+from pbrl_mismatch.online.found import Found
+from pbrl_mismatch.online.monitor import MismatchMonitor
+from pbrl_mismatch.online.options import MonitorOptions
+from pbrl_mismatch.options import DiagnoseOptions
+from pbrl_mismatch.ros.conversions import mismatches_to_msg
+from pbrl_mismatch.ros.watcher import Watcher
+from pbrl_model.errors import ModelError
+from pbrl_model.ros.conversions import models_from_msg
+from pbrl_model.ros.listener import MEMORY, RecordingListener
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class MismatchNode(Node):
+    """Watches `/object_models` and the streams; publishes `/mismatches`, the alarm at once, the diagnosis later.
+
+    Raises:
+        BagError: a wrong parameter.
+        MismatchError: one that does not fit the others.
+    """
+
+    def __init__(self, context: Context | None = None, **options: Any) -> None:
+        super().__init__("mismatch_node", context=context, **options)
+        defaults = MonitorOptions()
+        chance = "chance of a false alarm within `horizon` of pushing"
+        horizon = "time for which that is promised [s]"
+        keep = "given to a diagnosis of what was heard, in whole holds [s]"
+        gather = "heard after an alarm before the diagnosis begins [s]"
+        monitor = MonitorOptions(
+            false_alarm=declare(self, "false_alarm", defaults.false_alarm, chance, (1e-9, 0.5)),
+            horizon=declare(self, "horizon", defaults.horizon, horizon, (10.0, 1e7)),
+            rest=declare(self, "rest", defaults.rest, "between two alarms about one object [s]", (1.0, 1e6)),
+            keep=declare(self, "keep", defaults.keep, keep, (5.0, 600.0)),
+            gather=declare(self, "gather", defaults.gather, gather, (0.0, 60.0)),
+        )
+        diagnosing = declare(self, "diagnose", True, "whether to say what was left out, not only that something was")
+        without: list[str] = declare(self, "without", [], "effects that the library is to do without")
+        workers = declare(self, "workers", 1, "threads of a diagnosis", (1, 256))
+        seed = declare(self, "seed", 0, "of every random draw", (0, 2**31 - 1))
+        period = declare(self, "period", 0.1, "between two looks at what has come [s]", (0.01, 1.0))
+        memory = declare(self, "memory", MEMORY, "messages kept for a diagnosis at most [MB]", (1.0, 100_000.0))
+        refuse_unknown(self)
+        chosen = DiagnoseOptions(without=tuple(without), workers=workers, seed=seed)
+        self._mismatches = self.create_publisher(Mismatches, "/mismatches", LATCHED)
+        self.listener = RecordingListener("mismatch_node_listener", context, memory)
+        self._watcher = Watcher(
+            MismatchMonitor(monitor),
+            self.listener,
+            chosen if diagnosing else None,
+            self._changed,
+            self.get_logger().warning,
+            period,
+        )
+        self.create_subscription(ObjectModels, "/object_models", self._take_models, LATCHED)
+        self._watcher.start()
+        self.listener.start()
+
+    def _take_models(self, message: ObjectModels) -> None:
+        try:
+            self._watcher.give(models_from_msg(message))
+        except ModelError as error:
+            self.get_logger().warning(f"/object_models: {' '.join(str(error).split())}")
+
+    def _changed(self, entries: tuple[Found, ...], stamp: float) -> None:
+        self._mismatches.publish(mismatches_to_msg(entries, stamp))
+
+    def destroy_node(self) -> None:
+        """Stop watching and listening with the node."""
+        self._watcher.stop()
+        self.listener.stop()
+        super().destroy_node()
+
+
+def main() -> None:
+    """Run the node; errors at start are one line and exit code 2."""
+    node = None
+    fault = ""
+    try:
+        stop = init_until_signal()
+        node = MismatchNode()
+        spin_until(node, stop.is_set)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (BagError, ModelError, MismatchError) as error:
+        fault = " ".join(str(error).split())
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    if fault:
+        print(f"mismatch_node: {fault}", file=sys.stderr)
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

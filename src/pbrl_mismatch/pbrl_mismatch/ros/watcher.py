@@ -1,0 +1,167 @@
+"""Watches in a thread what a listener hears, so that callbacks stay alive."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+
+from pbrl_bag.errors import BagError
+from pbrl_mismatch.online.diagnosing import DiagnosisWorker, options_for
+from pbrl_mismatch.online.found import Findings, Found
+from pbrl_mismatch.online.monitor import Alarm, MismatchMonitor
+from pbrl_mismatch.online.slices import last_holds
+from pbrl_mismatch.options import DiagnoseOptions
+from pbrl_model.errors import ModelError
+from pbrl_model.online.live import LiveRecording
+from pbrl_model.posterior import Posterior
+from pbrl_model.ros.listener import RecordingListener
+
+PATIENCE = 1.0
+"""Waited for a step to end [s]."""
+QUIET = 1.0
+"""Nothing heard for so long [s]: what there is for a diagnosis is all there will be."""
+
+Changed = Callable[[tuple[Found, ...], float], None]
+"""(everything that was found, newest stamp heard [s])."""
+
+
+class Watcher:
+    """Feeds a monitor from a listener, and diagnoses after an alarm.
+
+    Args:
+        monitor: with its options.
+        listener: whose messages are followed.
+        options: of a diagnosis; None: there is none.
+        changed: called in the watcher's thread.
+        warn: takes a line for a human.
+        period: between two looks at what has come [s].
+    """
+
+    def __init__(
+        self,
+        monitor: MismatchMonitor,
+        listener: RecordingListener,
+        options: DiagnoseOptions | None,
+        changed: Changed,
+        warn: Callable[[str], None],
+        period: float,
+    ) -> None:
+        self._monitor = monitor
+        self._listener = listener
+        self._options = options
+        self._changed = changed
+        self._warn = warn
+        self._period = period
+        self._live = LiveRecording()
+        self._clocks = self._left_out = 0
+        self._heard_at = time.monotonic()
+        self._findings = Findings()
+        self._worker = DiagnosisWorker()
+        self._gathering: dict[str, Alarm] = {}
+        self._given: dict[str, Posterior] = {}
+        self._said: dict[str, str] = {}
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="mismatch watch", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._listener.follow()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End; a diagnosis that is under way is given up."""
+        self._stop.set()
+        self._worker.stop()
+        if self._thread.is_alive():
+            self._thread.join(PATIENCE)
+
+    def give(self, posteriors: Mapping[str, Posterior]) -> None:
+        """Take models as they are published; safe from any thread."""
+        with self._lock:
+            self._given.update(posteriors)
+
+    def _run(self) -> None:
+        while not self._stop.wait(self._period):
+            try:
+                self.step()
+            except Exception as error:  # a fault of ours must not end the watch
+                self._say("", f"internal error: {type(error).__name__}: {' '.join(str(error).split())}")
+
+    def step(self) -> None:
+        """Take in what has come, test, begin diagnoses that are due, and tell what is new."""
+        if self._take_messages():
+            self._heard_at = time.monotonic()
+        with self._lock:
+            given, self._given = self._given, {}
+        self._monitor.give(given, self._live.now)
+        if self._live.held:
+            self._watch()
+        self._begin_diagnoses()
+        done = self._worker.done()
+        if done:
+            self._findings.add_diagnoses(done)
+            self._tell()
+        self._live.forget(self._live.now - self._monitor.needed)
+
+    def _take_messages(self) -> bool:
+        fresh = self._listener.fresh()
+        for message in fresh:
+            try:
+                self._live.add(message.topic, message.decoded())
+            except BagError as error:
+                self._say(message.topic, str(error))
+        if self._live.clocks != self._clocks:
+            self._clocks = self._live.clocks
+            self._monitor.new_clock()
+            self._gathering.clear()
+            self._findings.forget()
+            self._tell()
+        if self._live.left_out > 2 * self._left_out:
+            self._left_out = self._live.left_out
+            self._warn(f"{self._left_out} messages came late or twice so far and were left out")
+        return bool(fresh)
+
+    def _watch(self) -> None:
+        try:
+            alarms = self._monitor.hear(self._live.recording())
+        except (BagError, ModelError) as error:
+            self._say("recording", str(error))
+            return
+        self._say("recording", "")
+        for name, one in self._monitor.objects.items():
+            self._say(name, one.reason)
+        if alarms and not self._stop.is_set():
+            self._findings.add_alarms(alarms)
+            self._tell()
+            for alarm in alarms:
+                self._warn(alarm.verdict)
+                if self._options is not None:
+                    self._gathering[alarm.object] = alarm
+
+    def _begin_diagnoses(self) -> None:
+        """Diagnose where enough was heard since the alarm, or nothing more comes."""
+        quiet = time.monotonic() - self._heard_at > QUIET
+        wait = self._monitor.options.gather
+        due = [alarm for alarm in self._gathering.values() if quiet or self._live.now >= alarm.time + wait]
+        for alarm in due:
+            del self._gathering[alarm.object]
+            assert self._options is not None
+            try:
+                recording = last_holds(self._listener.recording(), alarm.object, self._monitor.options.keep)
+            except BagError as error:
+                self._say("diagnosis", str(error))
+                continue
+            self._worker.start(recording, alarm.object, options_for(self._options, alarm.object, alarm.model_class))
+
+    def _tell(self) -> None:
+        if not self._stop.is_set():
+            self._changed(self._findings.entries, max(self._live.now, 0.0))
+
+    def _say(self, about: str, text: str) -> None:
+        """Warn, once as long as it stays the same."""
+        text = " ".join(text.split())
+        if text and text != self._said.get(about) and not self._stop.is_set():
+            self._warn(text)
+        self._said[about] = text

@@ -1,0 +1,163 @@
+"""What explains a mismatch: single effects on the baselines, then others on top, over windows that can be predicted."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from pbrl_mismatch.data.track import Track
+from pbrl_mismatch.effects.registry import EFFECTS
+from pbrl_mismatch.options import DiagnoseOptions
+from pbrl_mismatch.search.climb import climb
+from pbrl_mismatch.search.fitted import Fitted, Stages, alone, judged
+from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
+from pbrl_mismatch.search.library import search_library
+from pbrl_mismatch.search.objective import Objective
+from pbrl_mismatch.search.predictive import predictive_test
+from pbrl_mismatch.search.weigh import Weighed, veto, weigh
+
+GROUNDS_OF_SETS = 1
+"""So many of the likeliest hypotheses are tried with one effect more."""
+REACHED = 1.05
+"""A hypothesis that needs less than this scale of the noise predicts windows of its length."""
+POLISHED, LONGER = 5, 2
+"""So many of the likeliest effects are climbed on, for so many times the usual steps."""
+NEAR_THE_FLOOR = 1.1
+"""A hypothesis that needs less than this scale of the noise leaves nothing worth another effect."""
+WORTH_A_KIND = 3.0
+"""A kind of baseline with more parameters is worth a search of its own where it is better by this [nat]."""
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What was tried.
+
+    Attributes:
+        weighed: hypotheses, likeliest first; the baseline is among them.
+        bases: kinds of baseline over the same windows, best first.
+        stages: the windows that were asked.
+        log_odds: of any single effect against none, at even prior odds.
+    """
+
+    weighed: tuple[Weighed, ...]
+    bases: list[Fitted]
+    stages: Stages
+    log_odds: float
+
+
+def explain(
+    seed: np.random.SeedSequence,
+    track: Track,
+    bases: list[Fitted],
+    stages: Stages,
+    grip: GripEvidence | None,
+    options: DiagnoseOptions,
+) -> Explained:
+    """Try single effects, then others on top of the likeliest for as long as something is still left out.
+
+    Long windows say most of a force, but where feet stick and let go nothing predicts them: where no effect reaches the
+    noise floor over the longest, the next shorter ones are asked.
+
+    Args:
+        seed: of every draw.
+        track: what was recorded.
+        bases: kinds of baseline, fitted, best first.
+        stages: windows.
+        grip: what the grippers' poses say; None where none was seen.
+        options: settings.
+    """
+    seeds = seed.spawn(options.most_together)
+    tried = _tried(seeds[0], track, _grounds(bases), stages, grip, options)
+    singles = weigh(bases, tried, options)
+    if min(each.noise_scale for each in tried) > REACHED and len(stages.fitted) > 1:
+        stages, bases = stages.without_longest(), [each.over_shorter() for each in bases]
+        bases, tried = sorted(bases, key=lambda each: -each.evidence), [each.over_shorter() for each in tried]
+    tried = _polished(weigh(bases, tried, options), tried, stages, options)
+    weighed = weigh(bases, tried, options)
+    odds = min(_log_odds(singles), _log_odds(weighed))
+    for depth in range(1, options.most_together):
+        deepest = [each.fitted for each in weighed if len(each.effects) == depth][:GROUNDS_OF_SETS]
+        best = weighed[0]
+        enough = len(best.effects) < depth or best.fitted.noise_scale < NEAR_THE_FLOOR
+        if enough or not deepest or predictive_test(best.fitted.peak, 0).p_value >= options.level:
+            break
+        tried += _tried(seeds[depth], track, deepest, stages, grip, options)
+        weighed = weigh(bases, tried, options)
+    return Explained(weighed, bases, stages, odds)
+
+
+def _polished(
+    weighed: tuple[Weighed, ...], tried: list[Fitted], stages: Stages, options: DiagnoseOptions
+) -> list[Fitted]:
+    """Return what was tried, the likeliest climbed on, also from what the best one has for the baseline's parameters.
+
+    A law that is right may be held up where the wrong baseline put it: mass and wheel are then where another law, which
+    explains much too, has found them.
+    """
+    best = next((each.fitted for each in weighed if each.effects and GRASP_COMPLIANCE not in each.effects), None)
+    if best is None:
+        return tried
+    names = [each.effects for each in weighed if each.effects][:POLISHED]
+    chosen = {id(each.fitted) for each in weighed if each.effects in names}
+    jobs = [each for each in tried if id(each) in chosen and GRASP_COMPLIANCE not in each.hypothesis.effects]
+    with ThreadPoolExecutor(options.workers) as pool:
+        better = dict(
+            zip(map(id, jobs), pool.map(lambda each: _climbed_on(each, best, stages, options), jobs), strict=True)
+        )
+    return [better.get(id(each), each) for each in tried]
+
+
+def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseOptions) -> Fitted:
+    own = fitted.peak.coordinates[0]
+    crossed = own.copy()
+    effect = {column for name in fitted.hypothesis.effects for v in EFFECTS[name].variants for column in v}
+    for k, column in enumerate(fitted.hypothesis.columns):
+        if column in best.hypothesis.columns and column not in effect:
+            crossed[k] = best.peak.coordinates[0, best.hypothesis.columns.index(column)]
+    objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
+    peak = climb(objective, np.array([own, crossed]), iterations=LONGER * options.iterations[-1])
+    if not float(peak.evidence.max()) > float(fitted.peak.evidence[0]):
+        return fitted
+    return replace(fitted, peak=alone(peak))
+
+
+def held_against(explained: Explained, options: DiagnoseOptions) -> tuple[Weighed, ...]:
+    """Return the hypotheses with the likeliest held against what was held out of their fits."""
+    baseline = judged(explained.bases[0], explained.stages, options, even=True)
+    return veto(explained.weighed, baseline, partial(judged, stages=explained.stages, options=options))
+
+
+def _log_odds(weighed: tuple[Weighed, ...]) -> float:
+    """Return the log odds of any single effect against none, at even prior odds."""
+    none = next(each.log_weight for each in weighed if not each.effects)
+    some = [each.log_weight for each in weighed if len(each.effects) == 1]
+    return float(np.logaddexp.reduce(some)) - none if some else -math.inf
+
+
+def _tried(
+    seed: np.random.SeedSequence,
+    track: Track,
+    grounds: list[Fitted],
+    stages: Stages,
+    grip: GripEvidence | None,
+    options: DiagnoseOptions,
+) -> list[Fitted]:
+    """Try every effect on every ground; what the grippers' poses say comes in beside the motion."""
+    found = [beside_motion(each, grip) for each in search_library(seed, track, grounds, stages, options)]
+    if grip is not None and GRASP_COMPLIANCE in options.effects:
+        found += [gives_way(each, grip) for each in grounds if GRASP_COMPLIANCE not in each.hypothesis.effects]
+    return found
+
+
+def _grounds(bases: list[Fitted]) -> list[Fitted]:
+    """Return the baselines that effects are tried on: the simplest, and the best where that is another.
+
+    The best kind alone will not do: what an effect did, a wheel with two axes may have learned to stand in for.
+    """
+    simplest = min(bases, key=lambda each: len(each.hypothesis.parameters))
+    better = bases[0].evidence > simplest.evidence + WORTH_A_KIND
+    return [simplest, bases[0]] if better else [simplest]

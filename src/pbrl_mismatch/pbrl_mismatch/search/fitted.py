@@ -1,0 +1,233 @@
+"""Hypotheses fitted over windows that grow, and held against windows that were left out of the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.data.cuts import Cuts, cut_windows, held_out_blocks, inside, touching
+from pbrl_mismatch.data.track import Track
+from pbrl_mismatch.effects.effect import Scene
+from pbrl_mismatch.errors import MismatchError
+from pbrl_mismatch.kernels.columns import COLUMN
+from pbrl_mismatch.options import DiagnoseOptions
+from pbrl_mismatch.search.climb import Peak, climb
+from pbrl_mismatch.search.heldout import Score, held_out_score
+from pbrl_mismatch.search.hypothesis import Hypothesis
+from pbrl_mismatch.search.objective import Objective
+from pbrl_model.fitting.guesses import axle, circle, pivot
+
+Array = NDArray[np.float64]
+
+ENOUGH = 40
+"""Of more windows than this, only every other is looked at over the shortest."""
+BASELINE_STARTS, KEPT_OF_BASELINE = 20, 4
+"""A baseline is fitted from so many starts; so many go on to longer windows."""
+MOVING = 0.02
+"""Slower than this [m/s] is not taken for the speed of a push."""
+
+
+@dataclass(frozen=True)
+class Split:
+    """The longest windows split for a prediction of what was not fitted to.
+
+    Attributes:
+        kept: windows to fit to.
+        scored: windows that are held out.
+        told: the same time in windows of one block's length, whose errors are told.
+    """
+
+    kept: Cuts
+    scored: Cuts
+    told: Cuts
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Windows of growing length.
+
+    Attributes:
+        fitted: windows by length.
+        splits: of each length for held-out prediction; none where there is nothing to spare.
+    """
+
+    fitted: tuple[Cuts, ...]
+    splits: tuple[Split, ...]
+
+    @property
+    def split(self) -> Split | None:
+        """Return that of the longest windows, or None."""
+        return self.splits[-1] if self.splits else None
+
+    def without_longest(self) -> Stages:
+        """Return the others."""
+        return Stages(self.fitted[:-1], self.splits[:-1])
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One hypothesis after its fit.
+
+    Attributes:
+        hypothesis: what was fitted.
+        peak: its best point alone, over the longest windows.
+        score: on what was held out of a fit to the rest, or None where that was not done.
+        short: (K,) best coordinates over the shortest windows, which what is left out bends least; None: not kept.
+        shorter: its best point alone over the next shorter windows; None: not kept.
+        beside: log evidence of what the grippers' poses say beside the motion [nat].
+    """
+
+    hypothesis: Hypothesis
+    peak: Peak
+    score: Score | None
+    short: Array | None = None
+    shorter: Peak | None = None
+    beside: float = 0.0
+
+    @property
+    def row(self) -> Array:
+        """Return (WIDTH,) the parameter row."""
+        return self.hypothesis.rows(self.peak.coordinates)[0]
+
+    @property
+    def evidence(self) -> float:
+        """Return the log evidence [nat]."""
+        return float(self.peak.evidence[0]) + self.beside
+
+    def over_shorter(self) -> Fitted:
+        """Return this as it was over the next shorter windows, if that is known."""
+        return self if self.shorter is None else replace(self, peak=self.shorter, shorter=None)
+
+    @property
+    def noise_scale(self) -> float:
+        """Return the scale of the noise that it needs, at least one."""
+        return float(self.peak.sigma[0])
+
+
+def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:
+    """Cut a track into windows of every length, with blocks held out where it is long enough.
+
+    Raises:
+        ModelError: no window has enough poses.
+    """
+    cut = [cut_windows(track, length) for length in options.windows]
+    # A first look does not need every window: what is wrong with a start is wrong in most of them.
+    fitted = tuple(
+        cuts.take(np.arange(0, len(cuts), 2)) if len(cuts) > ENOUGH and stage == 0 < len(cut) - 1 else cuts
+        for stage, cuts in enumerate(cut)
+    )
+    blocks = held_out_blocks(track, options.block, options.every)
+    longest, splits = cut_windows(track, options.block), []
+    for cuts in cut:
+        out, within, touched = inside(longest, blocks), inside(cuts, blocks), touching(cuts, blocks)
+        if not (out.any() and within.any()) or touched.all():
+            return Stages(fitted, ())
+        splits.append(Split(cuts.take(~touched), cuts.take(within), longest.take(out)))
+    return Stages(fitted, tuple(splits))
+
+
+def scene_of(track: Track, row: Array) -> Scene:
+    """Return what priors are scaled by, with the mass of a baseline's row."""
+    lower, upper = track.outline.min(axis=0), track.outline.max(axis=0)
+    half = 0.5 * (upper - lower)
+    size = float(np.hypot(*half))
+    low, high = track.seen[:, :2].min(axis=0), track.seen[:, :2].max(axis=0)
+    force = np.hypot(track.felt[:, 0], track.felt[:, 1])
+    speed = np.hypot(track.seen[:, 3], track.seen[:, 4])
+    moving = speed > MOVING
+    return Scene(
+        middle=0.5 * (low + high),
+        reach=0.5 * (high - low) + size,
+        centroid=0.5 * (lower + upper),
+        half=half,
+        mass=float(row[COLUMN["mass"]]),
+        force=max(float(np.sqrt(np.mean(force**2))), 0.5),
+        speed=max(float(np.sqrt(np.mean(speed[moving] ** 2))) if moving.any() else 0.0, MOVING),
+        start=float(track.clock[0]),
+        seconds=float(track.clock[-1] - track.clock[0]),
+    )
+
+
+def fit_from(hypothesis: Hypothesis, stages: Stages, starts: Array, options: DiagnoseOptions) -> Fitted:
+    """Climb from starts (n, K) over windows that grow, keeping the best."""
+    u, peak, short, shorter = starts[: options.candidates], None, None, None
+    for stage, (cuts, iterations) in enumerate(zip(stages.fitted, options.iterations, strict=True)):
+        rough = stage + 2 < len(stages.fitted)
+        shorter = peak
+        peak = climb(Objective(hypothesis, cuts, options.sensor_floor), u, iterations=iterations, rough=rough)
+        order = np.argsort(-peak.evidence, kind="stable")
+        short = peak.coordinates[order[0]] if short is None else short
+        if stage + 1 < len(stages.fitted):
+            u = apart(peak.coordinates[order], hypothesis.spread, options.keep[stage + 1])
+    if peak is None:
+        raise MismatchError("search: expected at least one length of window, got none")
+    return Fitted(hypothesis, alone(peak), None, short, None if shorter is None else alone(shorter))
+
+
+def apart(coordinates: Array, spread: Array, count: int) -> Array:
+    """Return the first points of a list, leaving out those next to one that is already in."""
+    kept: list[Array] = []
+    for point in coordinates:
+        if all(np.max(np.abs(point - other) / spread) > 0.02 for other in kept):
+            kept.append(point)
+        if len(kept) == count:
+            break
+    return np.array(kept)
+
+
+def fit_baseline(
+    rng: np.random.Generator, track: Track, hypothesis: Hypothesis, stages: Stages, options: DiagnoseOptions
+) -> Fitted:
+    """Fit one kind of baseline from draws of its prior and from what the motion alone suggests."""
+    starts = hypothesis.sample_prior(rng, BASELINE_STARTS)
+    columns = hypothesis.columns
+    for k, name in enumerate(columns):
+        if name in ("mass", "inertia_factor", "delay"):
+            starts[:, k] = hypothesis.mean[k]
+    if "wheel_x" in columns:
+        x, y = columns.index("wheel_x"), columns.index("wheel_y")
+        com = track.body[1:3]
+        starts[:3, [x, y]] = pivot(track.motions, com)
+        angle, place = axle(track.motions, com)
+        starts[3:6, [x, y]] = place
+        if "wheel_theta" in columns:
+            starts[3:6, columns.index("wheel_theta")] = angle
+    keep = (len(starts), *(KEPT_OF_BASELINE for _ in options.keep[1:]))
+    wide = options.model_copy(update={"candidates": len(starts), "keep": keep})
+    return fit_from(hypothesis, stages, starts, wide)
+
+
+def hinge_guess(track: Track) -> dict[str, float] | None:
+    """Return the circle that recorded positions lie on, as a hinge's first guess; None for a line."""
+    found = circle(track.motions)
+    if found is None:
+        return None
+    centre, radius = found
+    return {"hinge_x": float(centre[0]), "hinge_y": float(centre[1]), "hinge_radius": radius}
+
+
+def alone(peak: Peak) -> Peak:
+    """Return the best of its points."""
+    return peak.take(np.array([peak.best]))
+
+
+def judged(fitted: Fitted, stages: Stages, options: DiagnoseOptions, *, even: bool = False) -> Fitted:
+    """Fit anew to what is not held out, and score how the rest is predicted.
+
+    The fit begins at the best points of all windows, so that what is compared is how well a law predicts and not how
+    well it is found in less.
+
+    Args:
+        fitted: to all windows.
+        stages: windows.
+        options: settings.
+        even: fit by common least squares, as one does who suspects nothing.
+    """
+    if stages.split is None:
+        return fitted
+    starts = [fitted.peak.coordinates[0]] + ([fitted.short] if fitted.short is not None else [])
+    objective = Objective(fitted.hypothesis, stages.split.kept, options.sensor_floor, even)
+    peak = climb(objective, np.array(starts), iterations=options.iterations[-1])
+    return replace(fitted, score=held_out_score(peak, peak.best, stages.split.scored, stages.split.told))

@@ -1,0 +1,188 @@
+"""What the grippers' poses say: whether the hold gives way, or the body's poses come late against the gripper's.
+
+The place of the gripper's point against the contact is a linear law of the force, of its direction and of the speed,
+
+    q = q_0 + R(a) e + R(-h) b + C f + p f / |f| + T v + noise,
+
+with a place q_0 of its own for each grasp; Bayesian linear regression has the evidence in closed form. An edge turns
+between the plates, by `a`: where the gripper's point is on it is known but for an error e, of each grasp too. The
+camera may see body and gripper off against each other by b in the world, which turns against the body as its heading
+h does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+
+from pbrl_mismatch.data.grip import GripTrack
+from pbrl_mismatch.effects.grasp_compliance import PARAMETERS
+from pbrl_mismatch.kernels.columns import COLUMN
+from pbrl_mismatch.search.fitted import Fitted
+from pbrl_mismatch.search.objective import Reduced
+
+Array = NDArray[np.float64]
+
+GRASP_COMPLIANCE, LATENESS = "grasp_compliance", "time_offset"
+"""Effects that show between gripper and body."""
+NEW_RUBBER, NEW_RUBBER_SPREAD = 5e-5, 3e-5
+"""Compliance of a hold that is as it should be [m/N]."""
+SOFT_FORCE = 0.5
+"""A force has a direction from about here on [N]."""
+FREE_PLACE, POINT_SPREAD, CAMERA_SPREAD = 0.1, 0.01, 0.01
+"""Standard deviations of where a grasp is, which is not known, of the gripper's point and of the camera's error [m]."""
+RANK = 1e-4
+"""Directions of the places that are weaker than this share of the strongest are none."""
+LATE_SPREAD = 0.12
+"""Of a delay that is a fault, as in the effect `time_offset` [s]."""
+GIVES, PLAYS, LATE = 0, 1, 2
+"""Columns of what is learned beside the grasps' places."""
+
+
+@dataclass(frozen=True)
+class GripEvidence:
+    """What the grippers' poses say.
+
+    Attributes:
+        rigid: log evidence that the hold is as it should be and no stream late [nat], up to a common constant.
+        gives: that the hold gives way.
+        late: that the body's poses are late against the gripper's.
+        p_value: chance of so large a misfit if it is rigid.
+        mean: (2,) compliance [m/N] and play [m] if it gives.
+        covariance: (2, 2) of those.
+    """
+
+    rigid: float
+    gives: float
+    late: float
+    p_value: float
+    mean: Array
+    covariance: Array
+
+
+def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence:
+    """Weigh what may act between gripper and body.
+
+    Args:
+        grips: readings.
+        delay_spread: of a delay that is no fault [s].
+    """
+    laws, places, seen = _laws(grips)
+    known = _place_spread(places.shape[1])
+    usual = np.array([NEW_RUBBER_SPREAD, 1e-9, delay_spread])
+    soft = np.array([p.spread for p in PARAMETERS])
+    # Noise from the richest law, freed of all of them: a hold that gives is no worse sensor.
+    every = np.column_stack([places, laws])
+    own, _, rank, _ = np.linalg.lstsq(every, seen, rcond=RANK)
+    count = max(len(seen) - int(rank), 1)
+    rest = float(np.sum((seen - every @ own) ** 2))
+    variance = rest / count
+    shifted = seen - laws[:, GIVES] * NEW_RUBBER
+
+    def weigh(spread: Array) -> tuple[float, Array, Array]:
+        design = np.column_stack([places, laws])
+        prior = np.concatenate([known, spread]) ** -2.0
+        matrix = design.T @ design / variance + np.diag(prior)
+        found = np.linalg.solve(matrix, design.T @ shifted / variance)
+        left = np.sum((shifted - design @ found) ** 2) / variance + np.sum(prior * found**2)
+        value = -0.5 * float(left) - 0.5 * float(np.linalg.slogdet(matrix)[1]) + 0.5 * float(np.sum(np.log(prior)))
+        inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+        return value, np.asarray(found[-3:], dtype=np.float64), inverse[-3:, -3:]
+
+    rigid, _, _ = weigh(usual)
+    gives, mean, spread = weigh(np.array([*soft, delay_spread]))
+    late, _, _ = weigh(np.array([usual[0], usual[1], LATE_SPREAD]))
+    centre = np.array([NEW_RUBBER + mean[GIVES], mean[PLAYS]])
+    return GripEvidence(
+        rigid,
+        gives,
+        late,
+        _p_value(laws, places, shifted, usual, rest, count),
+        centre,
+        spread[: PLAYS + 1, : PLAYS + 1],
+    )
+
+
+def _laws(grips: GripTrack) -> tuple[Array, Array, Array]:
+    """Return designs (2 N, 3) of what is learned, (2 N, 4 G + 2) of the grasps' places, and what was seen (2 N,)."""
+    size = np.hypot(*grips.force.T)[:, None]
+    laws = np.stack([grips.force, grips.force / (size + SOFT_FORCE), grips.velocity], -1)
+    belongs = (grips.grasp[:, None] == np.arange(grips.grasp.max() + 1)).astype(float)
+    still = np.einsum("ng,ij->nigj", belongs, np.eye(2)).reshape(len(belongs), 2, -1)
+    turned = np.einsum("ng,nij->nigj", belongs, _rotations(grips.turn)).reshape(len(belongs), 2, -1)
+    places = np.concatenate([still, turned, _rotations(-grips.heading)], -1)
+    return laws.reshape(-1, 3), places.reshape(len(laws) * 2, -1), grips.place.reshape(-1)
+
+
+def _rotations(angle: Array) -> Array:
+    """Return (n, 2, 2) of angles (n,) [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
+
+
+def _place_spread(columns: int) -> Array:
+    """Return (4 G + 2,) the prior's standard deviations of what says where the grasps are [m]."""
+    grasps = (columns - 2) // 2
+    return np.concatenate([np.full(grasps, FREE_PLACE), np.full(grasps, POINT_SPREAD), np.full(2, CAMERA_SPREAD)])
+
+
+def _p_value(laws: Array, places: Array, seen: Array, usual: Array, rest: float, count: int) -> float:
+    """Return the F-test's p-value of what the laws explain beyond the grasps' places and what is usual of them."""
+    own, size, _ = np.linalg.svd(places, full_matrices=False)
+    own = own[:, size > RANK * size[0]]
+    free = laws - own @ (own.T @ laws)
+    target = seen - own @ (own.T @ seen)
+    found, _, _, _ = np.linalg.lstsq(free, target, rcond=None)
+    variance = rest / count
+    # Its covariance is the noise's and what is usual; the chi-square of the three, over three, is F.
+    spread = variance * np.linalg.pinv(free.T @ free) + np.diag(usual**2)
+    statistic = float(found @ np.linalg.solve(spread, found)) / len(found)
+    return float(f_distribution.sf(statistic, len(found), count))
+
+
+def beside_motion(fitted: Fitted, grip: GripEvidence | None) -> Fitted:
+    """Return a fitted hypothesis with what it makes of the grippers' poses counted.
+
+    A stream that is late may be the body's poses or the wrenches: only the first shows against the gripper.
+    """
+    effects = fitted.hypothesis.effects
+    if grip is None or GRASP_COMPLIANCE in effects:
+        return fitted
+    beside = grip.rigid
+    if LATENESS in effects:
+        beside = float(np.logaddexp(grip.rigid, grip.late) - np.log(2.0))
+    return replace(fitted, beside=beside)
+
+
+def gives_way(fitted: Fitted, grip: GripEvidence) -> Fitted:
+    """Return a fitted hypothesis with a hold that gives way added: what it adds is learned from other data.
+
+    Args:
+        fitted: the hypothesis without.
+        grip: what the grippers' poses say.
+    """
+    peak, hypothesis = fitted.peak, fitted.hypothesis
+    base = hypothesis.base.copy()
+    base[[COLUMN[p.column] for p in PARAMETERS]] = grip.mean
+    richer = replace(
+        hypothesis,
+        effects=(*hypothesis.effects, GRASP_COMPLIANCE),
+        variant=f"{hypothesis.variant} + {GRASP_COMPLIANCE}/0",
+        parameters=(*hypothesis.parameters, *PARAMETERS),
+        base=base,
+    )
+    r, k, more = peak.reduced, len(hypothesis.parameters), ((0, 0), (0, 0), (0, len(PARAMETERS)))
+    matrix = np.pad(r.matrix, (*more, more[-1]))
+    precision = np.linalg.inv(grip.covariance) - np.diag([p.spread**-2.0 for p in PARAMETERS])
+    matrix[:, 0, k:, k:] = precision / np.maximum(peak.weight[:, 0, None, None], 1e-12)
+    reduced = Reduced(matrix, np.pad(r.vector, more), np.pad(r.gain, ((0, 0), *more)), r.shift, r.log_det)
+    coordinates = np.column_stack([peak.coordinates, np.tile(grip.mean, (len(peak.coordinates), 1))])
+    objective = replace(peak.objective, hypothesis=richer)
+    extended = replace(peak, objective=objective, coordinates=coordinates, reduced=reduced)
+    added = replace(fitted, hypothesis=richer, peak=extended, short=None, shorter=None, beside=grip.gives)
+    if fitted.shorter is None:
+        return added
+    return replace(added, shorter=gives_way(replace(fitted, peak=fitted.shorter, shorter=None), grip).peak)

@@ -1,0 +1,1 @@
+"""A mismatch that no effect explains, described: sparse regression on physical features and a Gaussian process."""

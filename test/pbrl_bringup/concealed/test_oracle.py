@@ -1,0 +1,54 @@
+"""The told oracle: what "as strong as can be detected" means, against draws and closed forms."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, norm
+
+from pbrl_bringup.concealed.oracle import Oracle, non_centrality
+
+
+def test_one_number_is_found_in_95_percent_where_the_two_tails_say() -> None:
+    # Of a number with unit noise the far tail never counts: it stands at the sum of two quantiles.
+    assert non_centrality(1) == pytest.approx((norm.isf(0.025) + norm.isf(0.05)) ** 2, rel=1e-3)
+
+
+@pytest.mark.parametrize("freedom", [1, 3, 7])
+def test_it_is_the_strength_that_a_test_finds_in_95_of_100(freedom: int) -> None:
+    draws = np.random.default_rng(freedom).standard_normal((60_000, freedom))
+    draws[:, 0] += math.sqrt(non_centrality(freedom))
+    assert np.mean(np.sum(draws**2, axis=1) > chi2.isf(0.05, freedom)) == pytest.approx(0.95, abs=0.005)
+
+
+def test_it_grows_with_what_is_free_and_with_what_is_asked() -> None:
+    values = [non_centrality(freedom) for freedom in range(1, 12)]
+    assert np.all(np.diff(values) > 0.0)
+    assert non_centrality(3, 0.05, 0.5) < non_centrality(3) < non_centrality(3, 0.01)
+
+
+def fitted(parameters: int, misfit: float, beside: float = 0.0) -> Any:
+    """Return what an oracle looks at: so many free parameters and a misfit, its prior's part nothing."""
+    objective = SimpleNamespace(
+        likelihood=lambda value: -0.5 * value, prior_misfit=lambda coordinates: np.zeros(len(coordinates))
+    )
+    peak = SimpleNamespace(objective=objective, misfit=np.array([misfit]), coordinates=np.zeros((1, parameters)))
+    return SimpleNamespace(hypothesis=SimpleNamespace(parameters=range(parameters)), peak=peak, beside=beside)
+
+
+@pytest.mark.parametrize("times", [0.5, 1.0, 3.0])
+def test_strength_counts_in_units_of_the_least_that_is_found(times: float) -> None:
+    # The expected gain of a law with d numbers more is their non-centrality, the strength's square, and d by chance.
+    gain = times**2 * non_centrality(4) + 4.0
+    found = Oracle(fitted(7, 1000.0 - gain), fitted(3, 1000.0))
+    assert found.times_detectable == pytest.approx(times)
+    beside = Oracle(fitted(7, 1000.0, 0.5 * gain), fitted(3, 1000.0))
+    assert beside.times_detectable == pytest.approx(times)
+
+
+def test_nothing_gained_is_no_strength() -> None:
+    assert Oracle(fitted(7, 999.0), fitted(3, 1000.0)).times_detectable == 0.0

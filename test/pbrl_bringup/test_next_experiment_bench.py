@@ -1,0 +1,67 @@
+"""The bench of the next experiment: its cases, how recordings are joined, and its rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbrl_bag.types import Grasp, PoseStream, Recording, WrenchStream
+from pbrl_bringup.benches.next_experiment import (
+    FIRST_SEED,
+    GROUPS,
+    MOST,
+    Told,
+    cases_of,
+    figure,
+    laid_after,
+    rows_of,
+)
+from pbrl_bringup.commands.bench import BENCHES
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    time = np.arange(0.0, 3.0, 0.05)
+    poses = PoseStream(time, np.zeros((60, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (60, 1)))
+    return Recording(
+        path=Path("push"),
+        bodies={},
+        object_poses={"table": poses},
+        gripper_poses={"left": poses},
+        wrenches={"left": WrenchStream(time, np.zeros((60, 3)), np.zeros((60, 3)))},
+        grasps=(Grasp("left", "table", 1.0, 2.5, np.zeros(2)),),
+    )
+
+
+def told(chosen: int, random: int) -> Told:
+    return Told(GROUPS[0], "viscous_drag", 1, 0.5, chosen, random, (False, False), (0.5,))
+
+
+def test_scored_cases_have_scored_seeds_and_every_effect_is_true_once() -> None:
+    assert "next-experiment" in BENCHES
+    assert all(seed >= FIRST_SEED for _, _, seed in cases_of(0, False))
+    assert not {case[2] for case in cases_of(0, False)} & {case[2] for case in cases_of(1, False)}
+    assert {(group, truth) for group, truth, _ in cases_of(0, False)} == {(g, truth) for g in GROUPS for truth in g}
+    assert len(cases_of(0, True)) < len(cases_of(0, False))
+
+
+def test_joined_recordings_follow_each_other(recording: Recording) -> None:
+    joined = laid_after(recording, recording)
+    for before, after in (
+        (recording.object_poses["table"], joined.object_poses["table"]),
+        (recording.wrenches["left"], joined.wrenches["left"]),
+    ):
+        assert len(after.time) == 2 * len(before.time) and np.all(np.diff(after.time) > 0.0)
+    assert len(joined.grasps) == 2 * len(recording.grasps)
+    assert all(a.end <= b.start for a, b in zip(joined.grasps, joined.grasps[1:], strict=False))
+
+
+def test_the_row_compares_medians_with_half_of_chance() -> None:
+    row = rows_of([told(1, 2), told(1, 4), told(2, 2)])[0]
+    assert row.value == 1.0 and row.against["random"] == 2.0 and row.holds
+    row = rows_of([told(2, 2), told(MOST + 1, 2)])[0]
+    assert not row.holds
+    assert not rows_of([])[0].holds
+    assert figure([told(1, 2)]).axes[0].get_legend() is not None

@@ -1,0 +1,61 @@
+"""A diagnosis in a process of its own: its verdict comes back, a failure is a verdict, ending it waits for nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch.online.diagnosing import Diagnosed, DiagnosisWorker, diagnose_object, options_for
+from pbrl_mismatch.online.found import Findings, Found
+from pbrl_mismatch.online.monitor import Alarm
+from pbrl_mismatch.options import DiagnoseOptions
+
+PATIENCE = 120.0  # [s]
+ALARM = Alarm("table", 12.0, 1e-4, 5.0, "free")
+
+
+def unmoved(recording: Recording) -> Recording:
+    """A recording in which nothing is held."""
+    return replace(recording, grasps=())
+
+
+def test_what_goes_wrong_is_the_verdict(concealed_recording: Callable[..., Recording]) -> None:
+    found = diagnose_object(
+        unmoved(concealed_recording("clean", 1, seconds=4.0)), "table", options_for(DiagnoseOptions(), "table", "free")
+    )
+    assert found.report == {} and found.verdict.startswith("table: not diagnosed: ") and "\n" not in found.verdict
+
+
+def test_another_process_says_the_same(concealed_recording: Callable[..., Recording]) -> None:
+    recording = unmoved(concealed_recording("clean", 1, seconds=4.0))
+    options = options_for(DiagnoseOptions(), "table", "free")
+    worker = DiagnosisWorker()
+    worker.start(recording, "table", options)
+    assert worker.wait(PATIENCE)
+    assert worker.done() == [diagnose_object(recording, "table", options)]
+    worker.start(recording, "table", options)
+    worker.stop()
+    assert not worker.busy and worker.done() == []
+
+
+def test_the_class_that_failed_is_the_baseline() -> None:
+    chosen = options_for(DiagnoseOptions(seed=3), "table", "wheel+ground")
+    assert chosen.objects == ("table",) and chosen.seed == 3
+    assert {"wheel", "wheel+ground"} <= set(chosen.baseline)
+
+
+def test_entries_are_alarms_first_and_diagnoses_later() -> None:
+    findings = Findings()
+    findings.add_diagnoses([Diagnosed("chair", {}, "chair: ...")])
+    assert findings.entries == ()
+    findings.add_alarms([ALARM])
+    assert findings.entries == (Found(ALARM),) and "diagnosing" in findings.entries[0].verdict
+    findings.add_diagnoses([Diagnosed("table", {"unknown": True}, "table: something is left out")])
+    assert findings.entries[0].verdict == "table: something is left out"
+    later = replace(ALARM, time=50.0)
+    findings.add_alarms([later])
+    (entry,) = findings.entries
+    assert entry.alarm == later and entry.diagnosed is not None
+    findings.forget()
+    assert findings.entries == ()

@@ -1,0 +1,177 @@
+"""The node over DDS: says nothing before a model is there, alarms while a table is pushed, diagnoses, ends cleanly."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from builtin_interfaces.msg import Time
+from pbrl_msgs.msg import Mismatches, ObjectModels
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from pbrl_bag import write_recording
+from pbrl_bag.playback import load_bag
+from pbrl_bag.ros.conversions import message_class, profile_from_qos
+from pbrl_bag.types import Recording
+from pbrl_mismatch.online.diagnosing import Diagnosed
+from pbrl_mismatch.ros import mismatch_node, watcher
+from pbrl_mismatch.ros.conversions import mismatches_from_msg
+from pbrl_model.posterior import Posterior
+from pbrl_model.ros.conversions import models_to_msg
+
+PATIENCE = 60.0  # [s]
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class AtHand:
+    """A worker that has its verdict ready."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[Recording, str, Any]] = []
+        self._ready: list[Diagnosed] = []
+
+    def start(self, recording: Recording, name: str, options: Any) -> None:
+        self.asked.append((recording, name, options))
+        self._ready.append(Diagnosed(name, {"unknown": True}, f"{name}: something is left out"))
+
+    def done(self) -> list[Diagnosed]:
+        ready, self._ready = self._ready, []
+        return ready
+
+    def stop(self) -> None:
+        self._ready.clear()
+
+
+class Graph:
+    """The node in a thread, and somebody beside it who publishes and listens."""
+
+    def __init__(self, context: Context) -> None:
+        override = [Parameter("period", Parameter.Type.DOUBLE, 0.02), Parameter("gather", Parameter.Type.DOUBLE, 1.0)]
+        self.node = mismatch_node.MismatchNode(context, parameter_overrides=override)
+        self.client = Node("client", context=context)
+        self._spinner = SingleThreadedExecutor(context=context)
+        self._spinner.add_node(self.node)
+        self._mine = SingleThreadedExecutor(context=context)
+        self._mine.add_node(self.client)
+        self.heard: list[Mismatches] = []
+        self.client.create_subscription(Mismatches, "/mismatches", self.heard.append, LATCHED)
+        self.models = self.client.create_publisher(ObjectModels, "/object_models", LATCHED)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        with contextlib.suppress(ExternalShutdownException):
+            self._spinner.spin()
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        """Let the client work until a condition holds."""
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < deadline, "did not happen"
+            self._mine.spin_once(timeout_sec=0.005)
+
+    def play(self, bag: Path) -> None:
+        """Publish a bag as fast as it is heard."""
+        loaded = load_bag(bag)
+        publishers = {
+            name: self.client.create_publisher(message_class(topic.type), name, profile_from_qos(topic.qos))
+            for name, topic in loaded.topics.items()
+        }
+        self.until(lambda: all(one.get_subscription_count() for one in publishers.values()))
+        for k, message in enumerate(loaded.messages):
+            publishers[message.topic].publish(message.data)
+            if k % 20 == 19:
+                self.until(lambda expected=k + 1: self.node.listener.count() >= expected)
+
+    def close(self) -> None:
+        """End both nodes."""
+        self._spinner.shutdown()
+        self._thread.join()
+        self.node.destroy_node()
+        self.client.destroy_node()
+
+
+@pytest.fixture
+def at_hand(monkeypatch: pytest.MonkeyPatch) -> AtHand:
+    worker = AtHand()
+    monkeypatch.setattr(watcher, "DiagnosisWorker", lambda: worker)
+    return worker
+
+
+@pytest.fixture
+def graph(monkeypatch: pytest.MonkeyPatch, at_hand: AtHand) -> Iterator[Graph]:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    context = Context()
+    rclpy.init(context=context, domain_id=1 + (os.getpid() + 11) % 200)
+    graph = Graph(context)
+    yield graph
+    graph.close()
+    rclpy.try_shutdown(context=context)
+
+
+def test_an_alarm_comes_at_once_and_the_diagnosis_later(
+    graph: Graph, at_hand: AtHand, concealed_recording: Callable[..., Recording], tmp_path: Path
+) -> None:
+    recording = concealed_recording("floor_slope", 1, seconds=9.0)
+    draws = 20.0 + 0.3 * np.random.default_rng(0).normal(size=(1, 100, 1))
+    graph.models.publish(models_to_msg([Posterior("table", "free", ("mass",), draws)], Time()))
+    graph.until(graph.models.get_subscription_count)
+    graph.play(write_recording(recording, tmp_path / "bag"))
+    graph.until(lambda: graph.heard and graph.heard[-1].mismatches and graph.heard[-1].mismatches[0].diagnosed)
+    alarms = [message for message in graph.heard if message.mismatches and not message.mismatches[0].diagnosed]
+    assert alarms and alarms[0].mismatches[0].model_class == "free"
+    found = mismatches_from_msg(graph.heard[-1])["table"]
+    assert 1.5 < found.alarm.time < 9.0 and found.alarm.p_value < 0.01
+    assert found.verdict == "table: something is left out" and graph.heard[-1].mismatches[0].unknown
+    ((given, name, options),) = at_hand.asked
+    assert name == "table" and options.baseline == ("free",) and given.grasps[0].start == pytest.approx(1.5, abs=0.01)
+    assert given.wrenches["left"].time[-1] >= found.alarm.time
+
+
+@pytest.mark.parametrize("argument", ["false_alarm:=2.0", "keeps:=10.0"])
+def test_errors_at_start_are_one_line_and_exit_code_two(argument: str) -> None:
+    command = [sys.executable, "-m", "pbrl_mismatch.ros.mismatch_node", "--ros-args", "-p", argument]
+    domain = {"ROS_DOMAIN_ID": str(1 + (os.getpid() + 13) % 200), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    done = subprocess.run(command, env=os.environ | domain, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1 and done.stderr.startswith("mismatch_node: ")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_without_a_word(number: signal.Signals, tmp_path: Path) -> None:
+    environment = os.environ | {
+        "ROS_DOMAIN_ID": str(1 + (os.getpid() + 15) % 200),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }
+    command = [sys.executable, "-c", STARTED]
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None and process.stderr is not None
+        assert process.stdout.readline().strip() == "spinning"
+        process.send_signal(number)
+        assert process.wait(60) == 0
+        assert process.stderr.read() == ""
+
+
+STARTED = """
+from pbrl_mismatch.ros import mismatch_node
+spin = mismatch_node.spin_until
+mismatch_node.spin_until = lambda node, done: (print("spinning", flush=True), spin(node, done))
+mismatch_node.main()
+"""

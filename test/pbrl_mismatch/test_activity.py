@@ -1,0 +1,99 @@
+"""When an effect acts, asked of its own fitted law: closed forms along a recorded motion, and hostile input."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch import MismatchError, track_of
+from pbrl_mismatch.activity import GAP, activity, intervals, without, wrench_sizes
+from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
+
+MASS = 20.0
+
+
+def table_row(**values: float) -> np.ndarray:
+    row = neutral_row()
+    row[COLUMN["mass"]] = MASS
+    for name, value in values.items():
+        row[COLUMN[name]] = value
+    return row
+
+
+@pytest.fixture(scope="module")
+def track(concealed_recording: Callable[..., Recording]) -> Any:
+    return track_of(concealed_recording("clean", 1), "table")
+
+
+def inside(track: Any, found: tuple[tuple[float, float], ...]) -> np.ndarray:
+    return np.any([(track.clock >= a) & (track.clock < b) for a, b in found] or [np.zeros_like(track.clock, bool)], 0)
+
+
+def test_a_steady_force_is_as_large_as_it_is_and_acts_always(track: Any) -> None:
+    row = table_row(steady_x=3.0, steady_y=-4.0)
+    size = wrench_sizes(track, row, ["external_force"])["external_force"]
+    assert size is not None
+    np.testing.assert_allclose(size, 5.0, atol=1e-6)
+    assert inside(track, activity(track, row, ["external_force"])["external_force"] or ()).all()
+
+
+def test_a_load_acts_from_its_moment_on_and_never_before(track: Any) -> None:
+    moment = float(track.clock[len(track.clock) // 2])
+    found = activity(track, table_row(payload_mass=15.0, payload_time=moment), ["payload_change"])["payload_change"]
+    assert found and found[0][0] >= moment - 0.06  # a load comes on over some steps, so that its moment has a slope
+    assert found[-1][1] > moment + 1.0
+
+
+def test_a_cord_acts_where_it_is_taut(track: Any) -> None:
+    anchor = track.seen[0, :2] + [0.3, 0.2]
+    away = np.hypot(*(track.seen[:, :2] - anchor).T)
+    slack = float(np.quantile(away, 0.6))
+    row = table_row(tether_stiffness=400.0, tether_x=anchor[0], tether_y=anchor[1], tether_length=slack)
+    row[COLUMN["tether_at_x"]], row[COLUMN["tether_at_y"]] = track.body[1:3]
+    found = inside(track, activity(track, row, ["tether"])["tether"] or ())
+    reach = float(away.max()) - slack  # below a small share of the pull at its strongest it does not count
+    assert found[away > slack + 0.05 * reach].all()
+    assert found[away < slack - 0.02].mean() < 0.1  # pauses that are bridged
+
+
+def test_each_effect_of_two_is_asked_alone(track: Any) -> None:
+    row = table_row(steady_x=2.0, slope_x=0.01)
+    sizes = wrench_sizes(track, row, ["external_force", "floor_slope"])
+    np.testing.assert_allclose(sizes["external_force"], 2.0, atol=1e-6)
+    np.testing.assert_allclose(sizes["floor_slope"], 0.01 * MASS * 9.81, rtol=1e-2)
+    off = without(track, row, "external_force")
+    assert off[COLUMN["steady_x"]] == 0.0 and off[COLUMN["slope_x"]] == 0.01
+
+
+def test_below_the_floor_nothing_acts_and_what_no_force_shows_has_no_times(track: Any) -> None:
+    found = activity(track, table_row(steady_x=0.1, time_offset=0.2), ["external_force", "time_offset"])
+    assert found == {"external_force": (), "time_offset": None}
+
+
+def test_bouts_are_bridged_dropped_and_cut_by_episode(track: Any) -> None:
+    mask = np.zeros(len(track.clock), dtype=bool)
+    one = round(0.2 / track.dt)
+    pause = round(0.5 * GAP / track.dt)
+    mask[10 : 10 + one] = mask[10 + one + pause : 10 + 2 * one + pause] = True
+    mask[10 + 6 * one + pause] = True
+    found = intervals(track, mask)
+    assert len(found) == 1
+    assert found[0][0] == pytest.approx(track.clock[10])
+    assert found[0][1] == pytest.approx(track.clock[10 + 2 * one + pause - 1] + track.dt)
+    assert intervals(track, np.zeros_like(mask)) == ()
+    assert len(intervals(track, np.ones_like(mask))) == len(track.begin)
+
+
+def test_hostile_input(track: Any) -> None:
+    with pytest.raises(MismatchError, match="columns"):
+        activity(track, np.zeros(3), ["tether"])
+    with pytest.raises(MismatchError, match="expected one of"):
+        activity(track, table_row(), ["gravity"])
+    with pytest.raises(MismatchError, match="above zero"):
+        activity(track, table_row(), ["tether"], floor=0.0)
+    with pytest.raises(MismatchError, match="steps"):
+        intervals(track, np.zeros(3, dtype=bool))

@@ -1,0 +1,122 @@
+"""What the grippers' poses say of the hold: the regression's closed forms, and laws on readings drawn from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest, multivariate_normal
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch import track_of
+from pbrl_mismatch.data.grip import GripTrack, lay_grips
+from pbrl_mismatch.effects.grasp_compliance import PARAMETERS
+from pbrl_mismatch.search.grip import (
+    CAMERA_SPREAD,
+    FREE_PLACE,
+    NEW_RUBBER,
+    NEW_RUBBER_SPREAD,
+    POINT_SPREAD,
+    SOFT_FORCE,
+    grip_evidence,
+)
+
+DELAY, NOISE = 0.005, 0.002
+
+
+def turned(angle: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.column_stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]])
+
+
+def readings(
+    rng: np.random.Generator, compliance: float = NEW_RUBBER, play: float = 0.0, late: float = 0.0
+) -> GripTrack:
+    """Draw two grasps of forty readings, with an error of the gripper's point in each and one of the camera."""
+    grasp = np.repeat([0, 1], 40)
+    force = 12.0 * rng.standard_normal((80, 2))
+    heading, turn = np.cumsum(0.1 * rng.standard_normal(80)), 0.3 * rng.standard_normal(80)
+    velocity = 0.1 * rng.standard_normal((80, 2))
+    place = 0.02 * rng.standard_normal((2, 2))[grasp]
+    place += turned(turn, 0.005 * rng.standard_normal((2, 2))[grasp])
+    place += turned(-heading, np.tile(0.005 * rng.standard_normal(2), (80, 1)))
+    place += compliance * force + play * force / (np.hypot(*force.T)[:, None] + SOFT_FORCE) + late * velocity
+    place += NOISE * rng.standard_normal((80, 2))
+    return GripTrack(grasp, np.arange(80.0), place, heading, turn, force, velocity)
+
+
+def test_the_evidence_is_that_of_the_gaussian_that_the_law_is() -> None:
+    grips = readings(np.random.default_rng(0), compliance=4e-4)
+    found = grip_evidence(grips, DELAY)
+    size = np.hypot(*grips.force.T)[:, None]
+    laws = np.stack([grips.force, grips.force / (size + SOFT_FORCE), grips.velocity], -1).reshape(-1, 3)
+    own, spread = [], []
+    for k in (0, 1):
+        for unit in np.eye(2):
+            for angle, sigma in ((np.zeros(80), FREE_PLACE), (grips.turn, POINT_SPREAD)):
+                own.append((turned(angle, np.tile(unit, (80, 1))) * (grips.grasp == k)[:, None]).reshape(-1))
+                spread.append(sigma)
+    for unit in np.eye(2):
+        own.append(turned(-grips.heading, np.tile(unit, (80, 1))).reshape(-1))
+        spread.append(CAMERA_SPREAD)
+    places = np.array(own).T
+    every = np.column_stack([places, laws])
+    seen = grips.place.reshape(-1)
+    rest = seen - every @ np.linalg.lstsq(every, seen, rcond=None)[0]
+    variance = rest @ rest / (len(seen) - every.shape[1])
+
+    def evidence(wide: list[float]) -> float:
+        design, prior = np.column_stack([places, laws]), np.array([*spread, *wide])
+        covariance = (design * prior**2) @ design.T + variance * np.eye(len(seen))
+        value = multivariate_normal.logpdf(seen - laws[:, 0] * NEW_RUBBER, np.zeros(len(seen)), covariance)
+        return float(value) + 0.5 * len(seen) * np.log(2.0 * np.pi * variance)
+
+    soft = [parameter.spread for parameter in PARAMETERS]
+    assert found.rigid == pytest.approx(evidence([NEW_RUBBER_SPREAD, 1e-9, DELAY]), abs=1e-3)
+    assert found.gives == pytest.approx(evidence([*soft, DELAY]), abs=1e-3)
+    assert found.late == pytest.approx(evidence([NEW_RUBBER_SPREAD, 1e-9, 0.12]), abs=1e-3)
+
+
+def test_p_values_are_uniform_where_the_hold_is_as_it_should_be() -> None:
+    rng = np.random.default_rng(1)
+    values = []
+    for _ in range(200):
+        rubber = NEW_RUBBER + NEW_RUBBER_SPREAD * rng.standard_normal()
+        values.append(grip_evidence(readings(rng, rubber, late=DELAY * rng.standard_normal()), DELAY).p_value)
+    assert kstest(values, "uniform").pvalue > 0.01, np.sort(values)
+
+
+@pytest.mark.parametrize(("compliance", "play"), [(6e-4, 0.0), (NEW_RUBBER, 4e-3), (5e-4, 3e-3)])
+def test_a_hold_that_gives_is_seen_and_measured(compliance: float, play: float) -> None:
+    rng, off = np.random.default_rng(2), []
+    for _ in range(30):
+        found = grip_evidence(readings(rng, compliance, play), DELAY)
+        assert found.p_value < 1e-6 and found.gives > max(found.rigid, found.late) + 5.0
+        off.append(np.linalg.solve(np.linalg.cholesky(found.covariance), found.mean - [compliance, play]))
+    assert 0.6 < np.mean(np.square(off)) < 1.6
+
+
+def test_poses_that_are_late_are_no_soft_hold() -> None:
+    found = grip_evidence(readings(np.random.default_rng(3), late=0.1), DELAY)
+    assert found.late > max(found.rigid, found.gives) + 5.0 and found.p_value < 1e-6
+
+
+def test_readings_lie_where_the_gripper_holds(concealed_recording: Callable[..., Recording]) -> None:
+    recording = concealed_recording("grasp_compliance", 1)
+    grips = lay_grips(recording, track_of(recording, "table"))
+    assert grips is not None and len(grips.time) > 25
+    assert set(grips.grasp) == {0} and np.all(np.diff(grips.time) > 0.0)
+    found = grip_evidence(grips, DELAY)
+    assert found.gives > found.rigid + 5.0
+    clean = concealed_recording("clean", 1)
+    rigid = lay_grips(clean, track_of(clean, "table"))
+    assert rigid is not None
+    assert np.abs(rigid.place).max() < 0.012 and grip_evidence(rigid, DELAY).p_value > 0.01
+
+
+def test_where_no_gripper_was_seen_nothing_is_said(concealed_recording: Callable[..., Recording]) -> None:
+    recording = concealed_recording("clean", 1)
+    track = track_of(recording, "table")
+    assert lay_grips(replace(recording, gripper_poses={}), track) is None

@@ -1,0 +1,134 @@
+"""What a recording could not have shown: the stated power is the share of recordings in which it is noticed."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch import EFFECTS, DiagnoseOptions, MismatchError, track_of
+from pbrl_mismatch.data.cuts import cut_windows
+from pbrl_mismatch.data.simulation import poses
+from pbrl_mismatch.kernels.columns import COLUMN
+from pbrl_mismatch.observability.detectable import Sensitivity, could_not_show, detectable
+from pbrl_mismatch.observability.power import needed, power
+from pbrl_mismatch.observability.strengths import STRENGTHS, scaled, size_of, strength_columns
+from pbrl_mismatch.search.climb import climb
+from pbrl_mismatch.search.fitted import Fitted, scene_of
+from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
+from pbrl_mismatch.search.objective import NUISANCES, Objective
+
+FLOOR = 0.15
+
+
+@pytest.fixture(scope="module")
+def track(concealed_recording: Callable[..., Recording]) -> Any:
+    return track_of(concealed_recording("clean", 1), "table")
+
+
+@pytest.fixture(scope="module")
+def ground(track: Any) -> Fitted:
+    free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.005), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    return Fitted(free, climb(Objective(free, cut_windows(track, 2.0), FLOOR), free.mean[None], iterations=6), None)
+
+
+def test_power_is_the_share_of_draws_over_the_limit() -> None:
+    rng = np.random.default_rng(0)
+    for parameters, noncentrality in ((1, 3.0), (3, 9.0), (6, 17.0)):
+        draws = rng.standard_normal((40_000, parameters))
+        draws[:, 0] += math.sqrt(noncentrality)
+        share = np.mean(np.sum(draws**2, axis=1) > chi2.isf(0.05, parameters))
+        assert float(power(np.array(noncentrality), parameters, 0.05)) == pytest.approx(share, abs=0.01)
+
+
+def test_power_starts_at_the_level_grows_and_is_inverted_by_needed() -> None:
+    values = power(np.linspace(0.0, 60.0, 40), 4, 0.05)
+    assert values[0] == pytest.approx(0.05) and np.all(np.diff(values) >= 0.0)
+    for parameters in (1, 5):
+        assert float(power(np.array(needed(parameters, 0.05, 0.95)), parameters, 0.05)) == pytest.approx(0.95, abs=1e-6)
+    assert float(power(np.array(math.inf), 2, 0.05)) == pytest.approx(1.0)
+
+
+def test_an_effect_of_the_smallest_strength_is_noticed_as_often_as_stated(track: Any, ground: Fitted) -> None:
+    # Recordings are drawn from the model with a slope; what it gains when it is allowed a slope is the test.
+    rng, cuts = np.random.default_rng(1), ground.peak.objective.cuts.take(np.arange(4))
+    free = ground.hypothesis
+    ground = Fitted(free, climb(Objective(free, cuts, FLOOR), ground.peak.coordinates, iterations=3), None)
+    slope = free.with_effect(EFFECTS["floor_slope"], scene_of(track, ground.row), 0)
+    row = ground.row[None].copy()
+    row[0, COLUMN["slope_x"]] = 1e-3
+    unit = Sensitivity(ground).noncentrality(row)[0]
+    for wanted in (0.5, 0.9):
+        strong = row.copy()
+        strong[0, COLUMN["slope_x"]] *= math.sqrt(needed(2, 0.05, wanted) / unit)
+        noticed = []
+        for _ in range(24):
+            z = rng.standard_normal((1, len(cuts), NUISANCES))
+            told = cuts.told + np.einsum("wkl,pwl->pwk", cuts.root, z[..., :6])
+            extra = z[..., None, 6:] * FLOOR * np.array([1.0, 1.0, track.gyration])
+            noise = rng.standard_normal(cuts.pose.shape) / np.where(cuts.weight > 0.0, cuts.weight, 1.0)
+            data = replace(cuts, pose=poses(strong, cuts, told, extra)[0] + noise)
+            start = np.concatenate([ground.peak.coordinates[0], [0.0, 0.0]])
+            fits = [
+                climb(Objective(each, data, FLOOR), at[None], iterations=2)
+                for each, at in ((free, start[: len(free.parameters)]), (slope, start))
+            ]
+            cost = [float(fit.misfit.sum() + fit.objective.prior_misfit(fit.coordinates)[0]) for fit in fits]
+            noticed.append(cost[0] - cost[1] > chi2.isf(0.05, 2))
+        assert abs(np.mean(noticed) - wanted) < 0.25, (wanted, np.mean(noticed))
+
+
+def test_what_acts_on_all_motion_is_shown_and_what_is_elsewhere_is_not(ground: Fitted) -> None:
+    found = {each.effect: each for each in detectable(np.random.default_rng(0), ground)}
+    assert set(found) == set(EFFECTS)
+    for name in ("viscous_drag", "ground_friction", "floor_slope", "wrench_bias"):
+        assert found[name].shown and found[name].chance > 0.8
+    hidden = {each.effect for each in could_not_show(np.random.default_rng(0), ground)}
+    assert "grasp_compliance" in hidden and "detent" in hidden
+    assert hidden == {name for name, each in found.items() if not each.shown}
+    assert "nowhere" in found["grasp_compliance"].sentence()
+    json.dumps([each.to_report() for each in found.values()], allow_nan=False)
+
+
+def test_a_longer_recording_shows_weaker_effects(ground: Fitted) -> None:
+    few = ground.peak.objective.cuts.take(np.arange(3))
+    start = ground.peak.coordinates
+    short = Fitted(ground.hypothesis, climb(Objective(ground.hypothesis, few, FLOOR), start, iterations=3), None)
+    names = ("viscous_drag", "floor_slope")
+    all_of_it, some = (detectable(np.random.default_rng(0), each, names) for each in (ground, short))
+    assert all(a.smallest < b.smallest for a, b in zip(all_of_it, some, strict=True))
+
+
+def test_what_is_already_in_the_model_is_left_out(track: Any, ground: Fitted) -> None:
+    drag = ground.hypothesis.with_effect(EFFECTS["viscous_drag"], scene_of(track, ground.row), 1)
+    with_drag = Fitted(drag, climb(Objective(drag, ground.peak.objective.cuts, FLOOR), drag.mean[None]), None)
+    found = detectable(np.random.default_rng(0), with_drag, ("viscous_drag", "floor_slope"))
+    assert [each.effect for each in found] == ["floor_slope"]
+
+
+def test_strengths_scale_from_nothing(track: Any, ground: Fitted) -> None:
+    scene = scene_of(track, ground.row)
+    assert set(STRENGTHS) == set(EFFECTS) == set(DiagnoseOptions().effects)
+    for name, effect in EFFECTS.items():
+        for variant, free in enumerate(effect.variants):
+            columns = strength_columns(name, free)
+            hypothesis = ground.hypothesis.with_effect(effect, scene, variant)
+            rows = hypothesis.rows(hypothesis.sample_prior(np.random.default_rng(0), 4))
+            assert columns
+            np.testing.assert_allclose(size_of(scaled(rows, columns, np.zeros(4)), columns), 0.0, atol=1e-12)
+            np.testing.assert_allclose(scaled(rows, columns, np.ones(4)), rows)
+            assert np.all(size_of(scaled(rows, columns, np.full(4, 2.0)), columns) > size_of(rows, columns))
+
+
+def test_bad_input_is_refused(ground: Fitted) -> None:
+    with pytest.raises(MismatchError, match="power"):
+        needed(2, 0.05, 0.01)
+    with pytest.raises(MismatchError, match="effect"):
+        detectable(np.random.default_rng(0), ground, ("no_such",))

@@ -1,0 +1,94 @@
+"""Episodes laid end to end: what of a grasp counts, and the axes in which its wrench is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch import MismatchError, track_of
+from pbrl_mismatch.data.track import CLOSING, ROLLING, after_closing, lay_track
+from pbrl_model.fitting.fit import body_of, motions_of
+from pbrl_model.sensing.motion import Motion
+
+
+@pytest.fixture(scope="module")
+def recording(concealed_recording: Callable[..., Recording]) -> Recording:
+    return concealed_recording("clean", 1)
+
+
+@pytest.fixture(scope="module")
+def motion(recording: Recording) -> Motion:
+    return motions_of(recording, "table")[0]
+
+
+def at_speed(motion: Motion, speed: float) -> Motion:
+    state = motion.state.copy()
+    state[0, 3:5] = [speed, 0.0]
+    return replace(motion, state=state)
+
+
+def test_plates_that_close_on_a_body_at_rest_are_no_knock(motion: Motion) -> None:
+    assert after_closing(at_speed(motion, 0.5 * ROLLING)).time[0] == motion.time[0]
+
+
+def test_of_a_body_that_rolls_the_first_moments_are_left_out(motion: Motion) -> None:
+    rolling = at_speed(motion, 2.0 * ROLLING)
+    cut = after_closing(rolling)
+    first = round(CLOSING / motion.dt)
+    assert cut.time[0] == pytest.approx(motion.time[0] + CLOSING)
+    assert len(cut.time) == len(cut.state) == len(cut.covariance) == len(cut.wrench) + 1
+    np.testing.assert_array_equal(cut.wrench, motion.wrench[first:])
+    assert cut.pose_time[0] >= cut.time[0] and len(cut.pose_time) == len(cut.pose)
+    short = replace(rolling, time=rolling.time[: 2 * first + 1], wrench=rolling.wrench[: 2 * first])
+    assert after_closing(short) is short
+
+
+def test_the_sensor_s_wrench_turned_back_is_what_acts_at_the_centre_of_mass(recording: Recording) -> None:
+    track = track_of(recording, "table")
+    c, s, x, y = track.mount.T
+    np.testing.assert_allclose(c**2 + s**2, 1.0)
+    force = np.stack([c * track.felt[:, 0] - s * track.felt[:, 1], s * track.felt[:, 0] + c * track.felt[:, 1]], -1)
+    torque = track.felt[:, 2] + x * force[:, 1] - y * force[:, 0]
+    wrench = np.concatenate([motion.wrench for motion in track.motions])
+    np.testing.assert_allclose(np.column_stack([force, torque]), wrench, atol=1e-9)
+
+
+def test_the_axes_are_the_body_s_when_it_was_first_held_and_the_same_in_each_grasp(recording: Recording) -> None:
+    motion = motions_of(recording, "table")[0]
+    geometry = recording.bodies["table"]
+    half = len(motion.wrench) // 2
+    parts = [_part(motion, 0, half), _part(motion, half, len(motion.wrench))]
+    whole, cut = (
+        lay_track(recording, each, geometry, body_of(geometry, motion.oriented)) for each in ([motion], parts)
+    )
+    turn = np.arctan2(whole.mount[0, 1], whole.mount[0, 0])
+    assert np.angle(np.exp(1j * (turn - motion.state[0, 2]))) == pytest.approx(0.0, abs=0.02)
+    # The gripper is smoothed in each grasp alone: its turn differs by that, and by no more.
+    np.testing.assert_allclose(cut.mount[half:, :2], whole.mount[half:, :2], atol=0.02)
+    assert list(cut.begin) == [0, half] and list(cut.last) == [half - 1, len(motion.wrench) - 1]
+
+
+def _part(motion: Motion, first: int, last: int) -> Motion:
+    seen = (motion.pose_time >= motion.time[first]) & (motion.pose_time <= motion.time[last])
+    return replace(
+        motion,
+        time=motion.time[first : last + 1],
+        wrench=motion.wrench[first:last],
+        pose_time=motion.pose_time[seen],
+        pose=motion.pose[seen],
+        state=motion.state[first : last + 1],
+        covariance=motion.covariance[first : last + 1],
+    )
+
+
+def test_what_cannot_be_laid_is_refused(recording: Recording, motion: Motion) -> None:
+    geometry = recording.bodies["table"]
+    properties = body_of(geometry, motion.oriented)
+    with pytest.raises(MismatchError, match="at least one episode"):
+        lay_track(recording, [], geometry, properties)
+    with pytest.raises(MismatchError, match="one grid step"):
+        lay_track(recording, [motion, replace(motion, dt=0.02)], geometry, properties)
