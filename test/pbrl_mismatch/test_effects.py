@@ -36,7 +36,7 @@ def test_every_effect_says_what_it_is(name: str) -> None:
     known = {parameter.column for parameter in effect.parameters(SCENE)}
     used = {column for variant in effect.variants for column in variant}
     assert used == known and known <= set(COLUMN)
-    assert {*effect.angles, *effect.linear, *({effect.when} if effect.when else ())} <= known
+    assert {*effect.angles, *effect.linear} <= known
     values = {parameter.column: parameter.centre for parameter in effect.parameters(SCENE)}
     if effect.where is not None:
         place = effect.where(values, SCENE)

@@ -28,6 +28,8 @@ SHARE_LEFT, NEAR = 0.1, 2.0
 ALIKE = 3.0
 """Hypotheses within so many nats explain the recording alike."""
 SHOWN = 8
+LEAST_TOLD = 1e-12
+"""Tails further out than this are not told: no noise is known so well."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,8 @@ def sentence(name: str, mismatch: bool, verdict: Verdict, found: Findings) -> st
     """Return the verdict in one sentence."""
     if not mismatch:
         return f"{name}: model and recording agree (p = {verdict.p_value:.2g})"
+    chance = f"p = {verdict.p_value:.1g}" if verdict.p_value >= LEAST_TOLD else f"p < {LEAST_TOLD:g}"
     if not found.effects:
-        return f"{name}: something is left out (p = {verdict.p_value:.1g}), and it is none of what the library knows"
+        return f"{name}: something is left out ({chance}), and it is none of what the library knows"
     what = " and ".join(finding.effect for finding in found.effects)
-    return f"{name}: {what} is left out ({100 * found.effects[0].probability:.0f} %, p = {verdict.p_value:.1g})"
+    return f"{name}: {what} is left out ({100 * found.effects[0].probability:.0f} %, {chance})"

@@ -117,7 +117,6 @@ class Effect:
         fixed: columns that are given a value while the effect is on.
         fixed_in: others that are given one in some variants alone, by the variant's number.
         where: the place it has, from its parameters, or None.
-        when: the column of the moment at which it comes on, or None.
         direction: the frame in which its force keeps its direction, or what it follows.
         angles: columns that live on a circle.
         linear: columns that the effect's wrench is proportional to, all together.
@@ -136,7 +135,6 @@ class Effect:
     fixed: Mapping[str, float] = field(default_factory=dict)
     fixed_in: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
     where: Callable[[Values, Scene], Where | None] | None = None
-    when: str | None = None
     direction: str | None = None
     angles: tuple[str, ...] = ()
     linear: tuple[str, ...] = ()

@@ -42,7 +42,6 @@ EFFECT = Effect(
     ),
     fixed_in={1: {"payload_gone": 1.0}},
     where=where,
-    when="payload_time",
     direction="acceleration",
     linear=("payload_mass",),
 )
