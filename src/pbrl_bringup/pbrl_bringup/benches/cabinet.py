@@ -1,4 +1,4 @@
-"""A real PR2 pulls real doors open: hinge and path, learned from forces and the handle's way alone."""
+"""A real PR2 pulls real doors open: hinge and path, and what constant friction on that hinge leaves out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bag import Recording, read_recording
+from pbrl_bringup.benches.cabinet_catch import catch_of, false_alarms
 from pbrl_bringup.benches.rows import Measured, at_most, within
+from pbrl_bringup.diagnosis.door_figures import side_by_side
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.paths import config_file, workspace
 from pbrl_model.fitting.fit import FitOptions, ObjectFit, fit_recording, motions_of
@@ -18,11 +20,25 @@ from pbrl_model.predict import predict, unlearned
 Array = NDArray[np.float64]
 
 RECORDING = "pr2_cabinet/ikea_cabinet.csv"
+CATCHES = {"lab cabinet": "pr2_cabinet/lab_cabinet.csv", "IKEA cabinet": RECORDING}
 RADIUS, SLACK = 0.300, 0.015  # [m]
 FIRST_PART = 0.6  # of a pull, to learn from where the rest is to be predicted
 
 
 def measure(seed: int, quick: bool, out: Path) -> Measured:
+    """Fit the hinge of the IKEA cabinet, then say what both cabinets have that constant friction on a hinge has not."""
+    hinge = _hinge(seed)
+    mapping = config_file("mappings", "pr2_cabinet")
+    found = [catch_of(label, read_recording(data_file(name), mapping), seed, quick) for label, name in CATCHES.items()]
+    doors = {label: each.door for label, each in zip(CATCHES, found, strict=True) if each.door is not None}
+    side_by_side(doors).savefig(out / "doors.png", dpi=110)
+    found.append(false_alarms(seed, quick))
+    rows = [row for each in found for row in each.rows]
+    details = {name: part for each in found for name, part in each.details.items()}
+    return Measured([*hinge.rows, *rows], {**hinge.details, **details})
+
+
+def _hinge(seed: int) -> Measured:
     """Fit the hinge of the IKEA cabinet and compare with its radius and with the handle's recorded path."""
     recording = read_recording(data_file(RECORDING), config_file("mappings", "pr2_cabinet"))
     options = FitOptions(model_class="hinge", seed=seed)

@@ -10,11 +10,13 @@ from typing import Any
 from rich.console import Console
 
 from pbrl_bag import read_recording
+from pbrl_bringup.diagnosis.doors import run_doors
 from pbrl_bringup.diagnosis.models import write_models
 from pbrl_bringup.diagnosis.page import write_diagnosis
 from pbrl_bringup.files import result_folder, write_json
 from pbrl_bringup.terminal import output, say, table
 from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis, diagnose
+from pbrl_mismatch.joint.diagnosis import is_for_doors
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.told_baseline import is_model_file
 
@@ -47,12 +49,14 @@ def command(
     recording = read_recording(bag, mapping)
     for note in recording.notes:
         say(f"pbrl: {note}")
+    asked_for = "./pbrl " + shlex.join(sys.argv[1:])
+    if is_for_doors(recording, tuple(baseline) or None):
+        return run_doors(recording, options, out, asked_for)
     with result_folder(out) as folder:
         with Console(stderr=True).status(f"diagnosing (baseline {', '.join(options.baseline)}, seed {seed})"):
             found = diagnose(recording, options)
         write_json(folder / "report.json", found.to_report())
         models = write_models(found, folder, seed)
-        asked_for = "./pbrl " + shlex.join(sys.argv[1:])
         write_diagnosis(found, recording, asked_for, folder / "report.html", options=options, models=models)
     print_diagnosis(found)
     output().print(f"[bold]{out / 'report.html'}[/]")

@@ -1,0 +1,8 @@
+"""Doors in a few lines, for the tests beside."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
