@@ -18,6 +18,7 @@ setup(
     entry_points={
         "console_scripts": [
             "sim_node = krang_sim.ros.sim_node:main",
+            "hand_node = krang_sim.ros.hand_node:main",
         ],
     },
 )

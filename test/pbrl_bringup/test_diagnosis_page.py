@@ -16,7 +16,7 @@ from pbrl_bringup.concealed.cases import Case, make
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("pbrl_bringup.concealed.stage.PUSHES", 1)
-        recording, _ = make(Case((), 3))
+        recording = make(Case((), 3)).recording
     return write_recording(recording, tmp_path_factory.mktemp("clean") / "bag")
 
 

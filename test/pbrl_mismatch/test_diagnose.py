@@ -18,7 +18,7 @@ from pbrl_mismatch import DiagnoseOptions, Diagnosis, MismatchError, diagnose
 from pbrl_mismatch.diagnose import least_of_two, with_library
 from pbrl_model.errors import ModelError
 
-QUICK = {"keep": (3, 2, 1), "draws": 60, "survivors": (4, 2)}
+QUICK = {"draws": 60, "shortlist": 4, "survivors": (2,)}
 FEW = ("viscous_drag", "floor_slope", "time_offset", "wrench_bias")
 
 
@@ -158,7 +158,7 @@ def test_bad_input_is_refused_in_one_line(dragged: Recording) -> None:
         {"baseline": ("wheels",)},
         {"levl": 0.1},
         {"candidates": 0},
-        {"iterations": (3, 5)},
+        {"iterations": (3, 5, 8)},
         {"most_together": 4},
         {"models": 3},
         {"baseline": ()},

@@ -71,6 +71,23 @@ def test_ground_friction_spins_down_by_the_feet_s_levers(bench: Any) -> None:
     assert speeds(path)[-1, 2] == pytest.approx(wanted, abs=2e-3)
 
 
+def test_a_load_off_the_middle_turns_a_slide_by_its_lever_and_brakes_it_no_more(bench: Any) -> None:
+    even = bench(pushed(0.0, 20), moving(0.5)).run(slide_mu=0.05)
+    off = bench(pushed(0.0, 20), moving(0.5)).run(slide_mu=0.05, load_y=0.1)
+    np.testing.assert_allclose(speeds(off)[:, 0], speeds(even)[:, 0], rtol=1e-3)
+    turned = 0.05 * MASS * GRAVITY * 0.1 / INERTIA
+    assert np.diff(speeds(off)[:3, 2]).max() / DT == pytest.approx(turned, rel=0.02)
+
+
+def test_a_force_over_the_floor_loads_the_feet_that_it_tips_the_body_onto(bench: Any) -> None:
+    across = np.tile([0.0, 30.0, 0.0], (20, 1))
+    path = bench(across, moving(0.5)).run(slide_mu=0.02, load_height=0.5)
+    plain = bench(across, moving(0.5)).run(slide_mu=0.02)
+    turned = 0.02 * 30.0 * 0.5 / INERTIA
+    gained = np.diff(speeds(path)[:, 2] - speeds(plain)[:, 2])[:5].mean() / DT
+    assert gained == pytest.approx(turned, rel=0.1)
+
+
 def test_breakaway_friction_holds_until_its_static_limit(bench: Any) -> None:
     law = {"slide_mu": 0.02, "breakaway_mu": 0.05, "breakaway_speed": 0.02}
     held = bench(pushed(0.06 * MASS * GRAVITY)).run(**law)

@@ -24,6 +24,7 @@ from pbrl_mismatch.search.grip import (
 )
 
 DELAY, NOISE = 0.005, 0.002
+CONTACT = np.array([[0.5, 0.1], [-0.2, -0.4]])
 
 
 def turned(angle: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -44,7 +45,37 @@ def readings(
     place += turned(-heading, np.tile(0.005 * rng.standard_normal(2), (80, 1)))
     place += compliance * force + play * force / (np.hypot(*force.T)[:, None] + SOFT_FORCE) + late * velocity
     place += NOISE * rng.standard_normal((80, 2))
-    return GripTrack(grasp, np.arange(80.0), place, heading, turn, force, velocity)
+    return GripTrack(grasp, np.arange(80.0), place, heading, turn, CONTACT[grasp], force, velocity)
+
+
+def seen_off(grips: GripTrack, offset: np.ndarray) -> GripTrack:
+    """Return readings as a tag that is off by (x, y, turn) makes one see them."""
+    first = np.searchsorted(grips.grasp, grips.grasp)
+    way = offset[:2] + offset[2] * np.column_stack([-grips.contact[:, 1], grips.contact[:, 0]])
+    return replace(grips, place=grips.place + turned(grips.turn - grips.turn[first], way) - way)
+
+
+def test_a_tag_s_offset_shows_where_the_edge_turns_and_none_is_held_against_it() -> None:
+    wide, none = np.diag([0.06, 0.06, 0.15]) ** 2, np.zeros(3)
+    for seed in range(6):
+        grips = readings(np.random.default_rng(seed))
+        there = np.array([0.04, -0.03, 0.02])
+        with_tag = grip_evidence(seen_off(grips, there), DELAY)
+        assert with_tag.of_tag(none, wide) > 10.0 and grip_evidence(grips, DELAY).of_tag(none, wide) < 0.0
+        # An offset that is known is better than one that is not, and a wrong one is worse.
+        assert with_tag.of_tag(there, 1e-6 * np.eye(3)) > with_tag.of_tag(none, wide)
+        assert with_tag.of_tag(-there, 1e-6 * np.eye(3)) < 0.0
+
+
+def test_the_odds_of_a_tag_s_offset_are_those_of_the_gaussian_that_it_is() -> None:
+    found = grip_evidence(readings(np.random.default_rng(0)), DELAY)
+    rng, mean = np.random.default_rng(1), np.array([0.004, -0.002, 0.003])
+    spread = np.diag([0.004, 0.003, 0.01]) ** 2
+    draws = rng.multivariate_normal(mean, spread, 200_000)
+    gained = draws @ found.tag_pull - 0.5 * np.einsum("ni,ij,nj->n", draws, found.tag_precision, draws)
+    assert found.of_tag(mean, spread) == pytest.approx(
+        float(np.logaddexp.reduce(gained) - np.log(len(gained))), abs=0.1
+    )
 
 
 def test_the_evidence_is_that_of_the_gaussian_that_the_law_is() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
-from pbrl_mismatch.kernels.laws_kernel import FIRST_CASTER, SLOSH, STATE, UNSEEN
 from pbrl_mismatch.kernels.motion_kernel import rehearse, rehearse_windows
+from pbrl_mismatch.kernels.state import FIRST_CASTER, SLOSH, STATE, UNSEEN
 
 DT = 0.01
 SPAN = np.array([[k, 100, begin, last] for begin, last in ((0, 599), (600, 999)) for k in range(begin, last - 99, 75)])

@@ -14,6 +14,7 @@ from pbrl_bringup.paths import node_executable, workspace
 
 NODES = [
     ("krang_sim", "sim_node"),
+    ("krang_sim", "hand_node"),
     ("pbrl_bag", "recorder_node"),
     ("pbrl_bag", "player_node"),
     ("pbrl_control", "body_controller_node"),
@@ -58,6 +59,7 @@ def test_every_package_is_in_the_index(package: str) -> None:
     ("package", "executable", "parameter", "word"),
     [
         ("krang_sim", "sim_node", 'scene:="locked_castor"', "locked_caster"),
+        ("krang_sim", "hand_node", 'scene:="locked_castor"', "locked_caster"),
         ("pbrl_control", "push_node", 'plan:="turn_tabel"', "turn_table"),
         ("pbrl_model", "model_node", 'priors:="nowhere.yaml"', "nowhere.yaml"),
         ("pbrl_mismatch", "mismatch_node", "without:=['carpet']", "carpet"),

@@ -6,7 +6,7 @@ A push of 20 s costs about a second of one core. Same scene, pushes and seed: sa
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.random import Generator
@@ -26,6 +26,7 @@ from bullet_sim.hand_recording import (
     GraspChange,
     HandPush,
     HandRecording,
+    Limits,
     TagTrack,
     WrenchTrack,
 )
@@ -34,6 +35,8 @@ from bullet_sim.sensors import TagReading, Ticker, WristReading
 from bullet_sim.world import World
 
 Array = NDArray[np.float64]
+Heard = Callable[[float, WristReading | None, list[TagReading], tuple[GraspChange, ...]], None]
+"""(time [s], reading of the wrist if there is one, readings of tags, changes of what is held)."""
 
 STANDING = 1.2
 """[s] with open plates before each grasp: the sensor's weight and bias are read then."""
@@ -65,6 +68,7 @@ def push_by_hand(
     hand: HandSpec | None = None,
     side: str = "left",
     step: float = STEP,
+    limits: Limits | None = None,
 ) -> HandRecording:
     """Push bodies of a scene by hand, one grasp after the other, and record it.
 
@@ -75,20 +79,22 @@ def push_by_hand(
         hand: what the hand is like.
         side: which gripper it plays.
         step: physics step [s].
+        limits: at which a push is given up, which the status says; None: none.
 
     Raises:
         SimError: no pushes, an unknown body or gripper, a contact far from the body, or a scene that cannot be built.
     """
-    _check_pushes(scene, pushes, side)
+    check_pushes(scene, pushes, side)
     world_seed, sensor_seed = np.random.SeedSequence(seed).spawn(2)
     with BulletClient(step=step) as client:
         world = World(client, scene, np.random.default_rng(world_seed))
-        run = _Run(world, pushes, hand or HandSpec(), side, np.random.default_rng(sensor_seed))
+        run = HandRun(world, pushes[0], hand or HandSpec(), side, np.random.default_rng(sensor_seed))
+        run.limits = limits
         status = run.perform(pushes)
         return run.recording(status)
 
 
-def _check_pushes(scene: Scene, pushes: Sequence[HandPush], side: str) -> None:
+def check_pushes(scene: Scene, pushes: Sequence[HandPush], side: str = "left") -> None:
     """Raise SimError where pushes do not fit a scene."""
     if side not in GRIPPERS:
         raise SimError(f"hand: expected a gripper 'left' or 'right', got {side!r}")
@@ -129,13 +135,29 @@ def edge_grasp(body: Furniture, contact: tuple[float, float], depth: float) -> t
     return float(x), float(y), math.atan2(inwards[1], inwards[0])
 
 
-class _Run:
-    """One recording in the making."""
+class HandRun:
+    """One recording in the making.
 
-    def __init__(self, world: World, pushes: Sequence[HandPush], spec: HandSpec, side: str, rng: Generator) -> None:
+    Args:
+        world: the scene.
+        first: push to come, beside whose grasp the hand begins.
+        spec: what the hand is like.
+        side: which gripper it plays.
+        rng: of the sensors.
+        heard: called after every physics step with the readings that came, and with changes of the grasp.
+
+    Attributes:
+        limits: at which a push is given up; None: none.
+    """
+
+    limits: Limits | None = None
+
+    def __init__(
+        self, world: World, first: HandPush, spec: HandSpec, side: str, rng: Generator, heard: Heard | None = None
+    ) -> None:
         camera_rng, wrist_rng = rng.spawn(2)
-        self._world, self._spec, self._side = world, spec, side
-        *place, height = self._grasp_place(pushes[0])
+        self._world, self._spec, self._side, self._heard = world, spec, side, heard
+        *place, height = self._grasp_place(first)
         self._hand = Hand(world.client, spec, (place[0], place[1], place[2]), height)
         self._camera = tag_camera(world.scene, camera_rng)
         self._wrist = wrist_sensor(world.scene, side, wrist_rng)
@@ -149,6 +171,7 @@ class _Run:
         self._pushed: list[tuple[float, ...]] = []
         self._acts: list[list[tuple[bool, float]]] = [[] for _ in world.effects]
         self._slipped = 0.0
+        self._told = 0
 
     def _grasp_place(self, push: HandPush) -> tuple[float, float, float, float]:
         """Give where the hand takes a body (x, y, yaw, height) as the body stands now."""
@@ -177,6 +200,22 @@ class _Run:
                 return lost
         self._stand(AFTERWARDS)
         return self._fallen() or "done"
+
+    def one_more(self, push: HandPush) -> str:
+        """Do one push, the body kept in its place before and after; give the status.
+
+        Nobody lets go of a table on a slope for as long as it takes to think about the next push.
+        """
+        body = self._world.find(push.body)
+        body.park()
+        if self._readings:
+            self._carry(push)
+        self._stand(STANDING)
+        lost = self._push(push)
+        if not lost:
+            body.park()
+        self._stand(AFTERWARDS)
+        return lost or self._fallen() or "done"
 
     def _stand(self, seconds: float, *, beside: HandPush | None = None) -> None:
         """Stand, or keep beside an edge that may still drift, so that it is between the plates when they close."""
@@ -210,11 +249,20 @@ class _Run:
             self._step(*push.path.at(number * world.client.step_time, hand.yaw))
             if hand.is_out():
                 lost = f"the hand lost {push.body} at t = {world.client.time:.2f} s; push more gently"
+            lost = lost or self._beyond(push.body)
+            if lost:
                 break
         self._slipped += hand.slipped
         hand.release()
         self._grasps.append(GraspChange(world.client.time, None, np.zeros(3)))
         return lost
+
+    def _beyond(self, body: str) -> str:
+        """Say which limit is passed, or nothing."""
+        if self.limits is None or not self._times or not self._readings:
+            return ""
+        slipped = self._slipped + self._hand.slipped
+        return self.limits.passed(body, self._poses[body][-1][3:], slipped, self._readings[-1])
 
     def _step(self, vx: float, vy: float, spin: float) -> None:
         """Advance by one physics step, and read the sensors."""
@@ -229,7 +277,11 @@ class _Run:
             tags = {name: world.pose(name) for name in self._tagged}
             tags[f"{self._side}_gripper"] = hand.sensor_pose()
             self._camera.capture(time, tags)
-        self._seen += [(time, seen) for seen in self._camera.deliver(time)]
+        arrived = self._camera.deliver(time)
+        self._seen += [(time, seen) for seen in arrived]
+        if self._heard is not None:
+            self._heard(time, reading, arrived, tuple(self._grasps[self._told :]))
+            self._told = len(self._grasps)
         if self._truth.due(time):
             self._keep_truth(time)
 

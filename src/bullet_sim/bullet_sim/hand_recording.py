@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bullet_sim.errors import SimError
+from bullet_sim.sensors import WristReading
 
 Array = NDArray[np.float64]
 
@@ -64,6 +66,42 @@ class HandPath:
             cos, sin = float(np.cos(yaw)), float(np.sin(yaw))
             vx, vy = cos * vx - sin * vy, sin * vx + cos * vy
         return vx, vy, spin
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a hand that watches itself does not go beyond.
+
+    Attributes:
+        speed: of the body that it holds [m/s].
+        spin: of that body's turning [rad/s].
+        slipped: way of edges in the hand, of all grasps [m].
+        force: (3,) of the wrist sensor, its axes [N].
+        torque: (3,) likewise [N m].
+    """
+
+    speed: float
+    spin: float
+    slipped: float
+    force: Array
+    torque: Array
+
+    def passed(self, body: str, twist: Array, slipped: float, reading: WristReading) -> str:
+        """Say which limit is passed, or nothing.
+
+        Args:
+            body: name of what is held.
+            twist: (3,) its speed [m/s] and turning [rad/s].
+            slipped: way of edges in the hand so far [m].
+            reading: of the wrist sensor.
+        """
+        speed, spin = math.hypot(twist[0], twist[1]), abs(float(twist[2]))
+        if speed > self.speed or spin > self.spin:
+            return f"{body} swings, {speed:.2f} m/s and {spin:.2f} rad/s"
+        if slipped > self.slipped:
+            return f"{body} slips by {1000.0 * slipped:.0f} mm in the hand"
+        loaded = np.any(np.abs(reading.force) > self.force) or np.any(np.abs(reading.torque) > self.torque)
+        return "the wrist sensor is at its end" if loaded else ""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from pbrl_mismatch.data.grip import GripTrack, lay_grips
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
 from pbrl_mismatch.data.track import Track, after_closing, lay_track
 from pbrl_mismatch.errors import MismatchError
+from pbrl_mismatch.faults.sound import check_track, missing_notes, without_faults
 from pbrl_mismatch.next_experiment.candidates import Reach
 from pbrl_mismatch.next_experiment.experiment import NextExperiment, next_experiment
 from pbrl_mismatch.observability.detectable import could_not_show
@@ -133,17 +134,21 @@ def diagnose(recording: Recording, options: DiagnoseOptions | None = None) -> Di
 
 
 def track_of(recording: Recording, name: str) -> Track:
-    """Return what was felt and seen of one object.
+    """Return what was felt and seen of one object, and what of it is not to be believed.
 
     Raises:
-        MismatchError: nothing was felt while it was held.
-        ModelError: a stream is missing or broken, or the object never moved.
+        MismatchError: nothing was felt while it was held, it did not move, or something else was held in its place.
+        ModelError: a stream is broken.
     """
-    motions = [after_closing(motion) for motion in motions_of(recording, name)]
+    sound = without_faults(recording, name)
+    motions = [after_closing(motion) for motion in motions_of(sound.recording, name)]
     if max(float(np.abs(motion.wrench).max()) for motion in motions) < LEAST_FORCE:
         raise MismatchError(f"{name}: expected a force while it was held, got zero throughout; was the sensor on?")
     geometry = recording.bodies[name]
-    return lay_track(recording, motions, geometry, body_of(geometry, motions[0].oriented))
+    laid = lay_track(sound.recording, motions, geometry, body_of(geometry, motions[0].oriented))
+    track = replace(laid, missing=sound.missing)
+    check_track(track)
+    return track
 
 
 def told_baseline(name: str, options: DiagnoseOptions) -> ToldBaseline | None:
@@ -242,7 +247,7 @@ def _diagnose_object(
         "not_shown": [each.to_report() for each in could_not_show(rng, named, shown_by_motion)],
         "unknown_description": None,
     }
-    notes = [sentence(track.object, mismatch, verdict, found), *found.notes]
+    notes = [sentence(track.object, mismatch, verdict, found), *found.notes, *missing_notes(track)]
     if mismatch and not found.effects:
         try:
             report["unknown_description"] = describe_unknown(rng, track, residual, baseline.row).to_report()

@@ -56,14 +56,15 @@ class DiagnoseOptions(BaseModel):
     baseline: tuple[str, ...] = ("free", "caster", "wheel")
     models: tuple[Path, ...] = ()
     level: Share = 0.05
-    windows: tuple[Positive, ...] = (0.5, 1.0, 2.0)
+    windows: tuple[Positive, ...] = (1.0, 2.0)
     block: Positive = 4.0
     every: Annotated[int, Field(ge=2, le=20)] = 4
-    draws: Annotated[int, Field(ge=8, le=100_000)] = 180
-    candidates: Annotated[int, Field(ge=1, le=1000)] = 8
-    keep: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (2, 2, 1)
-    iterations: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (3, 5, 8)
-    survivors: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (8, 4)
+    draws: Annotated[int, Field(ge=8, le=100_000)] = 120
+    candidates: Annotated[int, Field(ge=1, le=1000)] = 4
+    shortlist: Annotated[int, Field(ge=1, le=1000)] = 10
+    keep: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (2, 1)
+    iterations: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (6, 8)
+    survivors: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = (4,)
     sensor_floor: Positive = 0.15
     mass_spread: Positive = 0.1
     inertia_spread: Positive = 0.1

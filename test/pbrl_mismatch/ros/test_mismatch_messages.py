@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pbrl_msgs.msg import Mismatches
+from pbrl_msgs.srv import PushObject
 from rclpy.serialization import deserialize_message, serialize_message
 
 from pbrl_mismatch.online.diagnosing import Diagnosed
@@ -15,6 +16,8 @@ from pbrl_mismatch.ros.conversions import (
     effect_to_msg,
     mismatches_from_msg,
     mismatches_to_msg,
+    push_from_msg,
+    push_to_msg,
     seconds_of,
     stamp_of,
 )
@@ -66,3 +69,15 @@ def test_stamps_are_seconds() -> None:
     for seconds in (0.0, 1.5, 1234567.123456789):
         assert abs(seconds_of(stamp_of(seconds)) - seconds) < 1e-6
     assert stamp_of(0.9999999999).nanosec == 999_999_999
+
+
+def test_a_push_that_is_asked_for_survives_the_wire() -> None:
+    push = {
+        "object": "table",
+        "contact_point": [-0.35, 0.5875],
+        "direction": [0.6, -0.8],
+        "speed": 0.12,
+        "duration": 2.0,
+    }
+    wire = serialize_message(push_to_msg({**push, "expected_bits": 0.5}))
+    assert push_from_msg(deserialize_message(wire, PushObject.Request)) == push

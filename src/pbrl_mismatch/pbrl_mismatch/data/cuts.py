@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_mismatch.data.missing import known_windows
 from pbrl_mismatch.data.track import Track
-from pbrl_model.sensing.windows import POSE_RATE, Windows, shooting_windows
+from pbrl_model.sensing.windows import POSE_RATE, Windows
 
 Array = NDArray[np.float64]
 
@@ -77,13 +78,12 @@ class Cuts:
 
 
 def cut_windows(track: Track, length: float, *, rate: float = POSE_RATE) -> Cuts:
-    """Cut a track into windows of about equal length [s].
+    """Cut a track into windows of about equal length [s] that hold nothing that is missing.
 
     Raises:
         ModelError: no window has enough poses.
     """
-    windows = shooting_windows(track.motions, length, rate=rate)
-    episode = windows.episode
+    windows, episode = known_windows(track.motions, track.missing, length, rate)
     starts = np.array([motion.time[0] for motion in track.motions])
     first = np.round((windows.start - starts[episode]) / track.dt).astype(np.int64) + track.begin[episode]
     span = np.stack([first, windows.steps, track.begin[episode], track.last[episode]], -1)

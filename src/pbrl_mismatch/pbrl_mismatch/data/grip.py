@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bag.types import Grasp, PoseStream, Recording
+from pbrl_mismatch.data.missing import in_missing
 from pbrl_mismatch.data.track import Track
 from pbrl_model.sensing.motion import Motion
 
@@ -38,6 +39,7 @@ class GripTrack:
         place: (N, 2) of the gripper's point that holds on, less the contact, in the body's frame [m].
         heading: (N,) of the body [rad].
         turn: (N,) of the gripper against the body [rad]: an edge turns between its plates.
+        contact: (N, 2) where it was said to hold on, in the body's frame [m].
         force: (N, 2) felt, in the body's axes [N].
         velocity: (N, 2) of the contact, in the body's axes [m/s].
     """
@@ -47,6 +49,7 @@ class GripTrack:
     place: Array
     heading: Array
     turn: Array
+    contact: Array
     force: Array
     velocity: Array
 
@@ -81,6 +84,7 @@ def _readings(track: Track, episode: int, motion: Motion, grasp: Grasp, stream: 
     rows = slice(int(track.begin[episode]), int(track.last[episode]) + 1)
     clock = track.clock[rows]
     keep = (stream.time > clock[0] + MARGIN) & (stream.time < clock[-1] - MARGIN)
+    keep &= ~in_missing(stream.time, track.missing)
     if keep.sum() < LEAST:
         return None
     time, gripper = stream.time[keep], stream.position[keep][:, :2]
@@ -96,7 +100,9 @@ def _readings(track: Track, episode: int, motion: Motion, grasp: Grasp, stream: 
     there = gripper + _turned(turn, np.broadcast_to(hold, gripper.shape))
     place = _turned(-state[:, 2], there - state[:, :2] - lever)
     speed = state[:, 3:5] + state[:, 5:] * np.column_stack([-lever[:, 1], lever[:, 0]])
-    columns = (time, place, state[:, 2], turn - state[:, 2], _turned(-state[:, 2], force), _turned(-state[:, 2], speed))
+    contact = np.broadcast_to(grasp.contact[:2], (len(time), 2))
+    across, along = _turned(-state[:, 2], force), _turned(-state[:, 2], speed)
+    columns = (time, place, state[:, 2], turn - state[:, 2], contact, across, along)
     return tuple(_together(time, each) for each in columns)
 
 

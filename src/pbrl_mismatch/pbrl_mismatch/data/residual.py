@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_mismatch.data.missing import in_missing
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.kernels.columns import WIDTH
@@ -24,6 +25,8 @@ MEMORY = 0.4
 """Time in which a left-out wrench forgets itself [s]: a contact's, a border's; steady ones are no worse for it."""
 SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 """Sizes of the left-out force that are tried [N]."""
+UNKNOWN_FORCE = 1e3
+"""Where the felt wrench is missing, nothing is known of what is left out beside it [N]."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,9 @@ def residual_wrench(
         likelihoods = [_smooth(track, row, each, memory, stride, back=False)[2] for each in SIZES]
         size = SIZES[int(np.argmax(likelihoods))]
     mean, spread, value = _smooth(track, row, size, memory, stride, back=True)
+    unknown = in_missing(track.clock, track.missing, memory)
+    mean[unknown, 6:] = 0.0
+    spread[unknown, 6:, 6:] += UNKNOWN_FORCE**2 * np.diag([1.0, 1.0, track.gyration**2])
     return ResidualWrench(
         track.clock, mean[:, :6], mean[:, 6:], spread[:, 6:, 6:], size, value, np.asarray(track.begin)
     )

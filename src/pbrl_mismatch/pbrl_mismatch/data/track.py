@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bag.types import BodyGeometry, Recording
+from pbrl_mismatch.data.missing import Missing
 from pbrl_mismatch.errors import MismatchError
 from pbrl_model.geometry import MassProperties, bounding_box, check_polygon
 from pbrl_model.sensing.clock import smooth_gripper
@@ -47,6 +48,7 @@ class Track:
         outline: (k, 2) footprint.
         feet: (F, 2) points that carry the load.
         nominal_mass: [kg], NaN where it was not told.
+        missing: stretches that are not to be believed; no window holds any of them.
     """
 
     object: str
@@ -62,6 +64,7 @@ class Track:
     outline: Array
     feet: Array
     nominal_mass: float
+    missing: tuple[Missing, ...] = ()
 
     @property
     def dt(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, positive
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, plain, positive
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -10,6 +10,9 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
     return (
         positive("slide_mu", 0.05, 1.2),
         positive("slide_extent", 1.0, 0.25),
+        plain("load_x", 0.0, 0.3 * float(scene.half[0])),
+        plain("load_y", 0.0, 0.3 * float(scene.half[1])),
+        positive("load_height", 0.5, 0.7),
         positive("breakaway_mu", 0.05, 1.0),
         positive("breakaway_speed", 0.02, 0.7),
     )
@@ -25,10 +28,14 @@ EFFECT = Effect(
         (
             "slide_mu",
             "slide_extent",
+            "load_x",
+            "load_y",
+            "load_height",
             "breakaway_mu",
             "breakaway_speed",
         ),
     ),
     direction="velocity",
     linear=("slide_mu", "breakaway_mu"),
+    sticks=True,
 )

@@ -37,4 +37,5 @@ EFFECT = Effect(
     angles=("caster_heading",),
     linear=("caster_roll", "caster_scrub"),
     remembers=True,
+    sticks=True,
 )

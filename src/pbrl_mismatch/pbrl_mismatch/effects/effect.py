@@ -124,6 +124,7 @@ class Effect:
         pulls: columns x and y of a place in the world, then of the point of the body that is drawn to it.
         cord: column of the length below which nothing pulls.
         remembers: whether more moves than the body, so that its past matters.
+        sticks: whether it is dry friction, which a body at rest does not show the strength of.
     """
 
     name: str
@@ -142,6 +143,7 @@ class Effect:
     pulls: tuple[str, ...] = ()
     cord: str | None = None
     remembers: bool = False
+    sticks: bool = False
 
     def chosen(self, scene: Scene, variant: int) -> tuple[Parameter, ...]:
         """Return the parameters that are free in one variant."""

@@ -14,6 +14,9 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         positive("patch_length", 0.6, 0.7),
         positive("patch_width", 0.6, 0.7),
         plain("patch_theta", 0.0, 0.8),
+        plain("load_x", 0.0, 0.3 * float(scene.half[0])),
+        plain("load_y", 0.0, 0.3 * float(scene.half[1])),
+        positive("load_height", 0.5, 0.7),
     )
 
 
@@ -43,10 +46,14 @@ EFFECT = Effect(
             "patch_length",
             "patch_width",
             "patch_theta",
+            "load_x",
+            "load_y",
+            "load_height",
         ),
     ),
     where=where,
     direction="velocity",
     angles=("patch_theta",),
     linear=("patch_mu",),
+    sticks=True,
 )

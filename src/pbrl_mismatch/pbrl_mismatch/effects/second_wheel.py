@@ -39,4 +39,5 @@ EFFECT = Effect(
     direction="body",
     angles=("wheel2_theta",),
     linear=("wheel2_mu_x", "wheel2_mu_y"),
+    sticks=True,
 )

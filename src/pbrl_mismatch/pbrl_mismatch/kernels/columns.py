@@ -4,8 +4,9 @@ The first twelve columns are those of `pbrl_model.parameters.KERNEL_COLUMNS`. An
 zero; its other columns then do not matter. `cone` chooses the law of the baseline's wheel: 0 limits its friction along
 each axis alone, as the thesis and `pbrl_model.kernel` do; 1 limits both together by an ellipse, as rubber on a floor
 does. A `mu_y` or `wheel2_mu_y` below zero stands for one that is the same as that along x, a
-`torque_scale` below zero for one that is the same as `force_scale`. `payload_gone` 1 stands for a load that is there
-from the start and is taken off.
+`torque_scale` below zero for one that is the same as `force_scale`. `load_x`, `load_y` are where the feet's load is
+centred, off their middle; a force at the height `load_height` over the floor moves it on. `payload_gone` 1 stands for
+a load that is there from the start and is taken off.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("delay", "s", 0.0),
     ("slide_mu", "1", 0.0),
     ("slide_extent", "1", 1.0),
+    ("load_x", "m", 0.0),
+    ("load_y", "m", 0.0),
+    ("load_height", "m", 0.0),
     ("breakaway_mu", "1", 0.0),
     ("breakaway_speed", "m/s", 0.01),
     ("drag_linear", "N s/m", 0.0),

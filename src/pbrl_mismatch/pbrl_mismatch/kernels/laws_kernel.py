@@ -15,6 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
+from pbrl_mismatch.kernels.contact_kernel import UNSEEN_STIFFNESS, contact
+from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH, UNSEEN
 from pbrl_model.kernel import GRAVITY
 
 Array = NDArray[np.float64]
@@ -27,10 +29,6 @@ SWITCHING = 0.1
 """What begins at some moment comes on within this time [s]: a fit needs a slope."""
 SETTLING = 0.02
 """Time in which a contact's or a cord's oscillation is damped [s]: damping over stiffness."""
-UNSEEN_STIFFNESS = 5000.0
-"""Stiffness of the contact with an unseen body [N/m]."""
-CASTERS, FIRST_CASTER, SLOSH, UNSEEN, STATE = 8, 6, 14, 18, 20
-"""Casters at most; where the headings, the load's swing and the unseen body's place stand in a state; its length."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -53,32 +51,6 @@ def resist(acc: Array, rx: float, ry: float, nx: float, ny: float, k: float) -> 
     acc[8] += k * lever * lever
 
 
-@njit(cache=True, error_model="numpy")
-def nearest_edge(outline: Array, bx: float, by: float) -> tuple[float, float, float, float, float]:
-    """Return the signed distance of a point to a counter-clockwise polygon, the nearest point, and the normal there.
-
-    The normal points from the polygon to the outside.
-    """
-    best, px, py, nx, ny, inside = math.inf, 0.0, 0.0, 0.0, 0.0, False
-    corners = outline.shape[0]
-    for i in range(corners):
-        ax, ay = outline[i, 0], outline[i, 1]
-        ex, ey = outline[(i + 1) % corners, 0] - ax, outline[(i + 1) % corners, 1] - ay
-        share = ((bx - ax) * ex + (by - ay) * ey) / (ex * ex + ey * ey)
-        share = min(max(share, 0.0), 1.0)
-        qx, qy = ax + share * ex, ay + share * ey
-        distance = math.sqrt((bx - qx) ** 2 + (by - qy) ** 2)
-        if distance < best:
-            best, px, py = distance, qx, qy
-            length = math.sqrt(ex * ex + ey * ey)
-            nx, ny = ey / length, -ex / length
-        if (ay > by) != (ay + ey > by) and bx < ax + (by - ay) / ey * ex:
-            inside = not inside
-    if not inside and best > 1e-9:
-        nx, ny = (bx - px) / best, (by - py) / best
-    return (-best if inside else best), px, py, nx, ny
-
-
 @njit(cache=True, error_model="numpy", forceinline=True)
 def between(time: float, start: float, end: float) -> float:
     """Return 1 within an interval of time, 0 outside, with edges so soft that a fit has a slope."""
@@ -97,27 +69,6 @@ def patch_share(p: Array, x: float, y: float) -> float:
     if along < -30.0 or across < -30.0:
         return 0.0
     return 1.0 / ((1.0 + math.exp(-along)) * (1.0 + math.exp(-across)))
-
-
-@njit(cache=True, error_model="numpy")
-def contact(
-    p: Array, outline: Array, state: Array, c: float, s: float, com: Array, qx: float, qy: float, radius: float
-) -> tuple[float, float, float, float, float]:
-    """Return depth of a disc at (qx, qy) in the footprint, lever of the contact and its outward normal, world axes."""
-    dx, dy = qx - state[0], qy - state[1]
-    gap, px, py, nx, ny = nearest_edge(outline, c * dx + s * dy + com[0], -s * dx + c * dy + com[1])
-    px, py = px - com[0], py - com[1]
-    return radius - gap, c * px - s * py, s * px + c * py, c * nx - s * ny, s * nx + c * ny
-
-
-@njit(cache=True, error_model="numpy")
-def move_unseen(p: Array, outline: Array, state: Array, c: float, s: float, com: Array) -> None:
-    """Let the unseen body slide away from a footprint that presses it harder than its friction holds."""
-    depth, _, _, nx, ny = contact(p, outline, state, c, s, com, state[UNSEEN], state[UNSEEN + 1], p[at.UNSEEN_RADIUS])
-    slid = depth - p[at.UNSEEN_FORCE] / UNSEEN_STIFFNESS
-    if slid > 0.0:
-        state[UNSEEN] += slid * nx
-        state[UNSEEN + 1] += slid * ny
 
 
 @njit(cache=True, error_model="numpy")
@@ -268,6 +219,27 @@ def drag_wheel(
     resist(acc, rx, ry, -ey, ex, across * across * scale)
 
 
+@njit(cache=True, error_model="numpy")
+def tilt(
+    p: Array, c: float, s: float, fx: float, fy: float, weight: float, feet: Array
+) -> tuple[float, float, float, float]:
+    """Return the feet's middle (x, y) [m] and how a foot's share of the load changes with its place from there [1/m].
+
+    A force (fx, fy) in world axes at a height over the floor tips the body: its load moves along the force.
+    """
+    count = feet.shape[0]
+    ox, oy, xx, yy = 0.0, 0.0, 0.0, 0.0
+    for i in range(count):
+        ox += feet[i, 0] / count
+        oy += feet[i, 1] / count
+    for i in range(count):
+        xx += (feet[i, 0] - ox) ** 2 / count
+        yy += (feet[i, 1] - oy) ** 2 / count
+    lever = p[at.LOAD_HEIGHT] / weight
+    x, y = p[at.LOAD_X] + lever * (c * fx + s * fy), p[at.LOAD_Y] + lever * (c * fy - s * fx)
+    return ox, oy, x / xx, y / yy
+
+
 @njit(cache=True, error_model="numpy", forceinline=True)
 def resistances(
     p: Array,
@@ -307,7 +279,11 @@ def resistances(
     slides = p[at.SLIDE_MU] > 0.0 or p[at.BREAKAWAY_MU] > 0.0
     rolls = p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0
     if slides or rolls or p[at.PATCH_MU] != 0.0:
+        even, ox, oy, gx, gy = load, 0.0, 0.0, 0.0, 0.0
+        if p[at.LOAD_X] != 0.0 or p[at.LOAD_Y] != 0.0 or p[at.LOAD_HEIGHT] > 0.0:
+            ox, oy, gx, gy = tilt(p, c, s, acc[0], acc[1], even * count, feet)
         for i in range(count):
+            load = even * max(1.0 + gx * (feet[i, 0] - ox) + gy * (feet[i, 1] - oy), 0.0)
             ax, ay = p[at.SLIDE_EXTENT] * feet[i, 0] - com[0], p[at.SLIDE_EXTENT] * feet[i, 1] - com[1]
             rx, ry = c * ax - s * ay, s * ax + c * ay
             ux, uy = vx - omega * ry, vy + omega * rx

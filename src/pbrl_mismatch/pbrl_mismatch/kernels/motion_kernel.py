@@ -13,8 +13,9 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.laws_kernel import CASTERS, FIRST_CASTER, SLOSH, STATE, UNSEEN, move_unseen
+from pbrl_mismatch.kernels.contact_kernel import move_unseen
 from pbrl_mismatch.kernels.sense_kernel import acting, as_seen, load_now, to_truth
+from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH, STATE, UNSEEN
 from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body, swing_load, turn_casters
 from pbrl_model.kernel import cos_sin
 

@@ -12,9 +12,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pbrl_mismatch.kernels.laws_kernel import STATE
 from pbrl_mismatch.kernels.motion_kernel import LAST, rehearse, step_seen
 from pbrl_mismatch.kernels.sense_kernel import as_seen, load_now, to_truth
+from pbrl_mismatch.kernels.state import STATE
 from pbrl_mismatch.kernels.step_kernel import fixed_axes
 
 Array = NDArray[np.float64]

@@ -14,9 +14,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.laws_kernel import SLOSH, STATE
 from pbrl_mismatch.kernels.motion_kernel import rehearse
 from pbrl_mismatch.kernels.sense_kernel import as_seen, load_now, to_truth
+from pbrl_mismatch.kernels.state import SLOSH, STATE
 from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body
 from pbrl_model.kernel import cos_sin
 

@@ -40,12 +40,14 @@ class Diagnosed:
         report: this object's part of `report.json`; empty where the diagnosis failed.
         verdict: in a sentence, or why there is none.
         notes: what must not be read into it.
+        next_push: in the form of `report.json`'s `next_experiment`, or None where there is nothing to tell apart.
     """
 
     object: str
     report: Mapping[str, Any]
     verdict: str
     notes: tuple[str, ...] = ()
+    next_push: Mapping[str, Any] | None = None
 
 
 def options_for(options: DiagnoseOptions, name: str, model_class: str) -> DiagnoseOptions:
@@ -59,7 +61,8 @@ def diagnose_object(recording: Recording, name: str, options: DiagnoseOptions) -
         found = diagnose(recording, options).objects[name]
     except (BagError, ModelError, MismatchError) as error:
         return Diagnosed(name, {}, f"{name}: not diagnosed: {' '.join(str(error).split())}")
-    return Diagnosed(name, dict(found.report), found.notes[0], tuple(found.notes[1:]))
+    push = None if found.next_push is None else found.next_push.to_report()
+    return Diagnosed(name, dict(found.report), found.notes[0], tuple(found.notes[1:]), push)
 
 
 class DiagnosisWorker:

@@ -28,6 +28,11 @@ class Found:
         return self.diagnosed.report if self.diagnosed is not None else {}
 
     @property
+    def next_push(self) -> Mapping[str, Any] | None:
+        """Return the push that would tell most, in the form of `report.json`; None where none would."""
+        return self.diagnosed.next_push if self.diagnosed is not None else None
+
+    @property
     def verdict(self) -> str:
         """Return it in a sentence."""
         return self.diagnosed.verdict if self.diagnosed is not None else self.alarm.verdict
@@ -54,6 +59,16 @@ class Findings:
     def forget(self) -> None:
         """Begin anew: what was found was found on another clock."""
         self._entries.clear()
+
+    @property
+    def next_push(self) -> Mapping[str, Any] | None:
+        """Return the push that would tell most of all, in the form of `report.json`."""
+        pushes = [each.next_push for each in self.entries if each.next_push is not None]
+        return max(pushes, key=lambda each: float(each["expected_bits"]), default=None)
+
+    def alarm_of(self, name: str) -> Alarm | None:
+        """Return the last alarm about an object."""
+        return self._entries[name].alarm if name in self._entries else None
 
     @property
     def entries(self) -> tuple[Found, ...]:

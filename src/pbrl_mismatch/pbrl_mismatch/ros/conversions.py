@@ -8,8 +8,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Vector3
 from pbrl_msgs.msg import Mismatch, MismatchEffect, Mismatches
+from pbrl_msgs.srv import PushObject
 
 from pbrl_mismatch.online.diagnosing import Diagnosed
 from pbrl_mismatch.online.found import Found
@@ -86,6 +87,29 @@ def found_from_msg(message: Mismatch) -> Found:
         return Found(alarm)
     report = json.loads(message.report) if message.report else {}
     return Found(alarm, Diagnosed(message.object, report, message.verdict, tuple(message.notes)))
+
+
+def push_to_msg(push: Mapping[str, Any]) -> PushObject.Request:
+    """Return `next_experiment` of `report.json` as what is asked of a robot, or of a simulator in its place."""
+    (x, y), (along, across) = push["contact_point"], push["direction"]
+    return PushObject.Request(
+        object=push["object"],
+        contact_point=Point(x=float(x), y=float(y)),
+        direction=Vector3(x=float(along), y=float(across)),
+        speed=float(push["speed"]),
+        duration=float(push["duration"]),
+    )
+
+
+def push_from_msg(request: PushObject.Request) -> dict[str, Any]:
+    """Return what is asked of a robot in the form of `report.json`, its bits left out."""
+    return {
+        "object": request.object,
+        "contact_point": [request.contact_point.x, request.contact_point.y],
+        "direction": [request.direction.x, request.direction.y],
+        "speed": request.speed,
+        "duration": request.duration,
+    }
 
 
 def mismatches_to_msg(entries: Iterable[Found], stamp: float) -> Mismatches:

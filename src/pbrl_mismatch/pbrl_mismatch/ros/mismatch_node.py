@@ -1,16 +1,24 @@
-"""Raises `/mismatches` as soon as an object's model no longer foretells what is heard, and says why a little later."""
+"""Raises `/mismatches` as soon as an object's model no longer foretells what is heard, and says why a little later.
+
+Where several things explain it, `/run_next_experiment` asks whoever offers `/push` for the push that would tell most of
+them apart; what is heard of it goes into a new diagnosis.
+"""
 
 from __future__ import annotations
 
+import json
 import sys
 from typing import Any
 
 import rclpy
 from pbrl_msgs.msg import Mismatches, ObjectModels
+from pbrl_msgs.srv import PushObject
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_srvs.srv import Trigger
 
 from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
@@ -20,7 +28,7 @@ from pbrl_mismatch.online.found import Found
 from pbrl_mismatch.online.monitor import MismatchMonitor
 from pbrl_mismatch.online.options import MonitorOptions
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_mismatch.ros.conversions import mismatches_to_msg
+from pbrl_mismatch.ros.conversions import mismatches_to_msg, push_to_msg
 from pbrl_mismatch.ros.watcher import Watcher
 from pbrl_model.errors import ModelError
 from pbrl_model.ros.conversions import models_from_msg
@@ -70,6 +78,9 @@ class MismatchNode(Node):
             period,
         )
         self.create_subscription(ObjectModels, "/object_models", self._take_models, LATCHED)
+        # In a group of its own: the answer comes while whoever asked for the experiment is still waiting.
+        self._pusher = self.create_client(PushObject, "/push", callback_group=ReentrantCallbackGroup())
+        self.create_service(Trigger, "/run_next_experiment", self._run_next_experiment)
         self._watcher.start()
         self.listener.start()
 
@@ -78,6 +89,22 @@ class MismatchNode(Node):
             self._watcher.give(models_from_msg(message))
         except ModelError as error:
             self.get_logger().warning(f"/object_models: {' '.join(str(error).split())}")
+
+    async def _run_next_experiment(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Have the push made that would tell most, and diagnose its object anew; answers when the push is done."""
+        push = self._watcher.next_push
+        if push is None:
+            response.message = "nothing is to be told apart: no diagnosis so far left two explanations and a push"
+            return response
+        if not self._pusher.service_is_ready():
+            response.message = "expected somebody who offers /push, a robot or a simulator; nobody does"
+            return response
+        done: PushObject.Response = await self._pusher.call_async(push_to_msg(push))
+        response.success, response.message = done.success, done.message
+        if done.success:
+            self._watcher.diagnose_again(push["object"])
+            response.message = f"pushed: {json.dumps(dict(push))}; a new diagnosis of {push['object']} follows"
+        return response
 
     def _changed(self, entries: tuple[Found, ...], stamp: float) -> None:
         self._mismatches.publish(mismatches_to_msg(entries, stamp))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from pbrl_bag.errors import BagError
 from pbrl_mismatch.online.diagnosing import DiagnosisWorker, options_for
@@ -59,6 +60,7 @@ class Watcher:
         self._findings = Findings()
         self._worker = DiagnosisWorker()
         self._gathering: dict[str, Alarm] = {}
+        self._asked: set[str] = set()
         self._given: dict[str, Posterior] = {}
         self._said: dict[str, str] = {}
         self._lock = threading.Lock()
@@ -81,6 +83,16 @@ class Watcher:
         """Take models as they are published; safe from any thread."""
         with self._lock:
             self._given.update(posteriors)
+
+    @property
+    def next_push(self) -> Mapping[str, Any] | None:
+        """Return the push that would tell most of what was found apart, in the form of `report.json`."""
+        return self._findings.next_push
+
+    def diagnose_again(self, name: str) -> None:
+        """Diagnose an object anew with all that was heard, once nothing more comes; safe from any thread."""
+        with self._lock:
+            self._asked.add(name)
 
     def _run(self) -> None:
         while not self._stop.wait(self._period):
@@ -144,6 +156,11 @@ class Watcher:
         """Diagnose where enough was heard since the alarm, or nothing more comes."""
         quiet = time.monotonic() - self._heard_at > QUIET
         wait = self._monitor.options.gather
+        if quiet:
+            with self._lock:
+                asked, self._asked = self._asked, set()
+            again = {name: self._findings.alarm_of(name) for name in sorted(asked)}
+            self._gathering |= {name: alarm for name, alarm in again.items() if alarm is not None}
         due = [alarm for alarm in self._gathering.values() if quiet or self._live.now >= alarm.time + wait]
         for alarm in due:
             del self._gathering[alarm.object]

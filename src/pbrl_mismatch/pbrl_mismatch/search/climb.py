@@ -157,21 +157,6 @@ def climb(
     return Peak(objective, u, z, misfit, objective.weights(misfit), reduced, evidence, gained < 1.0)
 
 
-def most_promising(objective: Objective, coordinates: Array, spread: Array, count: int) -> tuple[Array, Array]:
-    """Return the best starts (count, K) with their nuisances settled (count, W, NUISANCES).
-
-    Args:
-        objective: hypothesis and windows.
-        coordinates: (P, K) starts.
-        spread: (W, R, NUISANCES) slopes in the nuisances of a model nearby.
-        count: how many are wanted.
-    """
-    slopes = np.broadcast_to(spread, (len(coordinates), *spread.shape))
-    z, _, misfit = settled(objective, coordinates, objective.at_rest(len(coordinates)), slopes)
-    best = np.argsort(_cost(objective, coordinates, misfit), kind="stable")[:count]
-    return coordinates[best], z[best]
-
-
 def settled(
     objective: Objective, coordinates: Array, nuisance: Array, spread: Array, residual: Array | None = None
 ) -> tuple[Array, Array, Array]:

@@ -9,20 +9,23 @@ from functools import partial
 
 import numpy as np
 
+from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, judged
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
-from pbrl_mismatch.search.library import search_library
+from pbrl_mismatch.search.library import search_library, trace
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.predictive import predictive_test
 from pbrl_mismatch.search.weigh import Weighed, veto, weigh
 
 GROUNDS_OF_SETS = 1
 """So many of the likeliest hypotheses are tried with one effect more."""
-REACHED = 1.05
+FEWER = {"shortlist": 6, "candidates": 2, "keep": (1, 1)}
+"""What is looked at where an effect is laid on another: the ground is nearly right."""
+REACHED = 1.12
 """A hypothesis that needs less than this scale of the noise predicts windows of its length."""
 POLISHED, LONGER = 5, 2
 """So many of the likeliest effects are climbed on, for so many times the usual steps."""
@@ -71,12 +74,16 @@ def explain(
         options: settings.
     """
     seeds = seed.spawn(options.most_together)
+    longest = cut_windows(track, max(options.windows))
+    bases = [trace(longest, options, each, each.peak.coordinates) for each in bases]
+    bases = sorted(bases, key=lambda each: -each.evidence)
     tried = _tried(seeds[0], track, _grounds(bases), stages, grip, options)
     singles = weigh(bases, tried, options)
     if min(each.noise_scale for each in tried) > REACHED and len(stages.fitted) > 1:
         stages, bases = stages.without_longest(), [each.over_shorter() for each in bases]
-        bases, tried = sorted(bases, key=lambda each: -each.evidence), [each.over_shorter() for each in tried]
-    tried = _polished(weigh(bases, tried, options), tried, stages, options)
+        bases = sorted(bases, key=lambda each: -each.evidence)
+        tried = [beside_motion(each.over_shorter(), grip) for each in tried]
+    tried = [beside_motion(each, grip) for each in _polished(weigh(bases, tried, options), tried, stages, options)]
     weighed = weigh(bases, tried, options)
     odds = min(_log_odds(singles), _log_odds(weighed))
     for depth in range(1, options.most_together):
@@ -85,7 +92,8 @@ def explain(
         enough = len(best.effects) < depth or best.fitted.noise_scale < NEAR_THE_FLOOR
         if enough or not deepest or predictive_test(best.fitted.peak, 0).p_value >= options.level:
             break
-        tried += _tried(seeds[depth], track, deepest, stages, grip, options)
+        fewer = options.model_copy(update=FEWER)
+        tried += _tried(seeds[depth], track, deepest, stages, grip, fewer)
         weighed = weigh(bases, tried, options)
     return Explained(weighed, bases, stages, odds)
 
@@ -118,8 +126,9 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
     for k, column in enumerate(fitted.hypothesis.columns):
         if column in best.hypothesis.columns and column not in effect:
             crossed[k] = best.peak.coordinates[0, best.hypothesis.columns.index(column)]
+    starts = [own, crossed] + ([fitted.traced.coordinates] if fitted.traced is not None else [])
     objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
-    peak = climb(objective, np.array([own, crossed]), iterations=LONGER * options.iterations[-1])
+    peak = climb(objective, np.array(starts), iterations=LONGER * options.iterations[-1])
     if not float(peak.evidence.max()) > float(fitted.peak.evidence[0]):
         return fitted
     return replace(fitted, peak=alone(peak))

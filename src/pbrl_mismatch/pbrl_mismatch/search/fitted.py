@@ -17,14 +17,19 @@ from pbrl_mismatch.search.climb import Peak, climb
 from pbrl_mismatch.search.heldout import Score, held_out_score
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Objective
+from pbrl_mismatch.search.path.along import lay_along
+from pbrl_mismatch.search.path.climb import climb_along
+from pbrl_mismatch.search.path.ground import MIDDLING, Traced, traced_score
 from pbrl_model.fitting.guesses import axle, circle, pivot
 
 Array = NDArray[np.float64]
 
 ENOUGH = 40
 """Of more windows than this, only every other is looked at over the shortest."""
-BASELINE_STARTS, KEPT_OF_BASELINE = 20, 4
-"""A baseline is fitted from so many starts; so many go on to longer windows."""
+BASELINE_STARTS, BASELINE_STEPS, KEPT_OF_BASELINE = 20, 6, 4
+"""A baseline is climbed along the path from so many starts, in so many steps; so many go on to windows."""
+WHOLE = 4
+"""Steps from the best of the kept windows to that of all."""
 MOVING = 0.02
 """Slower than this [m/s] is not taken for the speed of a push."""
 
@@ -36,11 +41,13 @@ class Split:
     Attributes:
         kept: windows to fit to.
         scored: windows that are held out.
+        both: those and the kept.
         told: the same time in windows of one block's length, whose errors are told.
     """
 
     kept: Cuts
     scored: Cuts
+    both: Cuts
     told: Cuts
 
 
@@ -77,6 +84,7 @@ class Fitted:
         short: (K,) best coordinates over the shortest windows, which what is left out bends least; None: not kept.
         shorter: its best point alone over the next shorter windows; None: not kept.
         beside: log evidence of what the grippers' poses say beside the motion [nat].
+        traced: its fit along the recorded path, over the longest windows; None: not made, or of other windows.
     """
 
     hypothesis: Hypothesis
@@ -85,6 +93,7 @@ class Fitted:
     short: Array | None = None
     shorter: Peak | None = None
     beside: float = 0.0
+    traced: Traced | None = None
 
     @property
     def row(self) -> Array:
@@ -93,17 +102,23 @@ class Fitted:
 
     @property
     def evidence(self) -> float:
-        """Return the log evidence [nat]."""
-        return float(self.peak.evidence[0]) + self.beside
+        """Return the log evidence [nat].
+
+        Simulated windows and the recorded path are two approximations of one integral: a simulation runs away where
+        feet stick and let go, the path is as uncertain as its smoothing. Both err by losing, so that the better counts.
+        """
+        simulated = float(self.peak.evidence[0])
+        return (simulated if self.traced is None else max(simulated, self.traced.evidence)) + self.beside
 
     def over_shorter(self) -> Fitted:
         """Return this as it was over the next shorter windows, if that is known."""
-        return self if self.shorter is None else replace(self, peak=self.shorter, shorter=None)
+        return self if self.shorter is None else replace(self, peak=self.shorter, shorter=None, traced=None)
 
     @property
     def noise_scale(self) -> float:
         """Return the scale of the noise that it needs, at least one."""
-        return float(self.peak.sigma[0])
+        simulated = float(self.peak.sigma[0])
+        return simulated if self.traced is None else min(simulated, self.traced.noise_scale)
 
 
 def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:
@@ -124,7 +139,7 @@ def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:
         out, within, touched = inside(longest, blocks), inside(cuts, blocks), touching(cuts, blocks)
         if not (out.any() and within.any()) or touched.all():
             return Stages(fitted, ())
-        splits.append(Split(cuts.take(~touched), cuts.take(within), longest.take(out)))
+        splits.append(Split(cuts.take(~touched), cuts.take(within), cuts.take(within | ~touched), longest.take(out)))
     return Stages(fitted, tuple(splits))
 
 
@@ -194,8 +209,12 @@ def fit_baseline(
         starts[3:6, [x, y]] = place
         if "wheel_theta" in columns:
             starts[3:6, columns.index("wheel_theta")] = angle
-    keep = (len(starts), *(KEPT_OF_BASELINE for _ in options.keep[1:]))
-    wide = options.model_copy(update={"candidates": len(starts), "keep": keep})
+    mass = float(hypothesis.base[COLUMN["mass"]])
+    along = lay_along(cut_windows(track, max(options.windows)), track.seen, mass, options.sensor_floor, MIDDLING)
+    found = climb_along(along, hypothesis, starts, BASELINE_STEPS)
+    order = np.argsort(-found.evidence, kind="stable")
+    starts = apart(found.coordinates[order], hypothesis.spread, KEPT_OF_BASELINE)
+    wide = options.model_copy(update={"candidates": len(starts)})
     return fit_from(hypothesis, stages, starts, wide)
 
 
@@ -228,6 +247,17 @@ def judged(fitted: Fitted, stages: Stages, options: DiagnoseOptions, *, even: bo
     if stages.split is None:
         return fitted
     starts = [fitted.peak.coordinates[0]] + ([fitted.short] if fitted.short is not None else [])
+    if fitted.traced is not None and len(fitted.traced.coordinates) == len(starts[0]):
+        starts.append(fitted.traced.coordinates)
     objective = Objective(fitted.hypothesis, stages.split.kept, options.sensor_floor, even)
     peak = climb(objective, np.array(starts), iterations=options.iterations[-1])
-    return replace(fitted, score=held_out_score(peak, peak.best, stages.split.scored, stages.split.told))
+    score = held_out_score(peak, peak.best, stages.split.scored, stages.split.told)
+    # Given the kept windows, the others are as likely as all over the kept: the same number by another way.
+    whole = climb(
+        replace(objective, cuts=stages.split.both), peak.take(np.array([peak.best])).coordinates, iterations=WHOLE
+    )
+    others = [float(whole.evidence[0] - peak.evidence[peak.best])]
+    if fitted.traced is not None:
+        others.append(traced_score(fitted.traced, stages.split.kept, stages.split.both, options.sensor_floor))
+    score = replace(score, log_score=max(score.log_score, *others))
+    return replace(fitted, score=score)

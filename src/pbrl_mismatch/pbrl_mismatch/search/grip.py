@@ -7,7 +7,8 @@ The place of the gripper's point against the contact is a linear law of the forc
 with a place q_0 of its own for each grasp; Bayesian linear regression has the evidence in closed form. An edge turns
 between the plates, by `a`: where the gripper's point is on it is known but for an error e, of each grasp too. The
 camera may see body and gripper off against each other by b in the world, which turns against the body as its heading
-h does.
+h does. A tag that is glued on with an offset moves the contact that it makes one see: as the edge turns between the
+plates about the true one, the gripper's point swings about it.
 """
 
 from __future__ import annotations
@@ -26,8 +27,9 @@ from pbrl_mismatch.search.objective import Reduced
 
 Array = NDArray[np.float64]
 
-GRASP_COMPLIANCE, LATENESS = "grasp_compliance", "time_offset"
+GRASP_COMPLIANCE, LATENESS, TAG_OFFSET = "grasp_compliance", "time_offset", "pose_bias"
 """Effects that show between gripper and body."""
+TAG = ("tag_x", "tag_y", "tag_theta")
 NEW_RUBBER, NEW_RUBBER_SPREAD = 5e-5, 3e-5
 """Compliance of a hold that is as it should be [m/N]."""
 SOFT_FORCE = 0.5
@@ -53,6 +55,8 @@ class GripEvidence:
         p_value: chance of so large a misfit if it is rigid.
         mean: (2,) compliance [m/N] and play [m] if it gives.
         covariance: (2, 2) of those.
+        tag_pull: (3,) slope of the log evidence in a tag's offset (x, y [m], turn [rad]), from none.
+        tag_precision: (3, 3) its curvature, taken negative.
     """
 
     rigid: float
@@ -61,6 +65,17 @@ class GripEvidence:
     p_value: float
     mean: Array
     covariance: Array
+    tag_pull: Array
+    tag_precision: Array
+
+    def of_tag(self, mean: Array, covariance: Array) -> float:
+        """Return how much likelier than with no offset the readings are with one of (3,), known to (3, 3) [nat]."""
+        root = np.linalg.cholesky(covariance + 1e-12 * np.eye(3))
+        inner = np.eye(3) + root.T @ self.tag_precision @ root
+        at_mean = float(self.tag_pull @ mean - 0.5 * mean @ self.tag_precision @ mean)
+        slope = root.T @ (self.tag_pull - self.tag_precision @ mean)
+        gained = 0.5 * float(slope @ np.linalg.solve(inner, slope))
+        return at_mean + gained - 0.5 * float(np.linalg.slogdet(inner)[1])
 
 
 def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence:
@@ -95,6 +110,11 @@ def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence:
     rigid, _, _ = weigh(usual)
     gives, mean, spread = weigh(np.array([*soft, delay_spread]))
     late, _, _ = weigh(np.array([usual[0], usual[1], LATE_SPREAD]))
+    tag = _tag_law(grips)
+    design, prior = np.column_stack([places, laws]), np.concatenate([known, usual]) ** -2.0
+    both = np.column_stack([shifted, tag])
+    found = np.linalg.solve(design.T @ design / variance + np.diag(prior), design.T @ both / variance)
+    unlikely = (both - design @ found) / variance
     centre = np.array([NEW_RUBBER + mean[GIVES], mean[PLAYS]])
     return GripEvidence(
         rigid,
@@ -103,6 +123,8 @@ def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence:
         _p_value(laws, places, shifted, usual, rest, count),
         centre,
         spread[: PLAYS + 1, : PLAYS + 1],
+        tag.T @ unlikely[:, 0],
+        tag.T @ unlikely[:, 1:],
     )
 
 
@@ -115,6 +137,15 @@ def _laws(grips: GripTrack) -> tuple[Array, Array, Array]:
     turned = np.einsum("ng,nij->nigj", belongs, _rotations(grips.turn)).reshape(len(belongs), 2, -1)
     places = np.concatenate([still, turned, _rotations(-grips.heading)], -1)
     return laws.reshape(-1, 3), places.reshape(len(laws) * 2, -1), grips.place.reshape(-1)
+
+
+def _tag_law(grips: GripTrack) -> Array:
+    """Return the design (2 N, 3) of a tag's offset: the seen contact's way off, turned as the gripper is less now."""
+    first = np.searchsorted(grips.grasp, grips.grasp)
+    swing = _rotations(grips.turn - grips.turn[first]) - np.eye(2)
+    lever = np.stack([-grips.contact[:, 1], grips.contact[:, 0]], -1)[..., None]
+    off = np.concatenate([np.broadcast_to(np.eye(2), (len(lever), 2, 2)), lever], -1)
+    return np.asarray((swing @ off).reshape(-1, 3), dtype=np.float64)
 
 
 def _rotations(angle: Array) -> Array:
@@ -154,6 +185,15 @@ def beside_motion(fitted: Fitted, grip: GripEvidence | None) -> Fitted:
     beside = grip.rigid
     if LATENESS in effects:
         beside = float(np.logaddexp(grip.rigid, grip.late) - np.log(2.0))
+    if TAG_OFFSET in effects:
+        columns = fitted.hypothesis.columns
+        at = [columns.index(name) if name in columns else None for name in TAG]
+        mean, covariance = np.zeros(3), np.zeros((3, 3))
+        free = [k for k, place in enumerate(at) if place is not None]
+        there = [place for place in at if place is not None]
+        mean[free] = fitted.peak.coordinates[0, there]
+        covariance[np.ix_(free, free)] = fitted.peak.covariance(0)[np.ix_(there, there)]
+        beside += grip.of_tag(mean, covariance)
     return replace(fitted, beside=beside)
 
 

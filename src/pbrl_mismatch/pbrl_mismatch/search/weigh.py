@@ -14,8 +14,11 @@ from pbrl_mismatch.search.fitted import Fitted
 VETO, VETO_SHARE = 8.0, 0.05
 """A hypothesis that predicts held-out windows worse than the baseline by this much [nat], and this share of what its
 evidence gained, is not named."""
-DISCREPANCY = 0.15
-"""Share of what a law explains that its being wrong may leave for others to explain."""
+DISCREPANCY, SHORT_OF_IT = 0.15, 0.5
+"""Share of what a law explains that its being wrong may leave for others to explain: where the others then reach the
+noise floor, and where even they do not."""
+FLOOR = 1.04
+"""A set that needs less than this scale of the noise reaches the floor."""
 JUDGED = 3
 """So many of the likeliest are held against held-out windows at most."""
 
@@ -65,7 +68,9 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
             # A law that is a little wrong leaves a share of what it explains, which any other effect may take.
             parts = [set(other) for other in groups if other and set(other) < set(key)]
             known = [max(m.evidence for m in groups[tuple(sorted(part))]) for part in parts]
-            weight -= DISCREPANCY * max(max(known, default=none) - none, 0.0)
+            best = members[int(np.argmax(finite))]
+            share = DISCREPANCY if best.noise_scale < FLOOR else SHORT_OF_IT
+            weight -= share * max(max(known, default=none) - none, 0.0)
         entries.append(Weighed(key, members[int(np.argmax(finite))], weight, 0.0, False))
     return _ordered(entries)
 

@@ -11,8 +11,8 @@ import pytest
 from pbrl_bag.types import Recording
 from pbrl_mismatch import residual_wrench, track_of
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
-from pbrl_mismatch.search import pulls
-from pbrl_mismatch.search.pulls import SHARE, TAUT, with_pulls
+from pbrl_mismatch.search.path import pulls
+from pbrl_mismatch.search.path.pulls import SHARE, TAUT, with_pulls
 
 POINT, FORCE = np.array([0.3, 0.2]), np.array([4.0, 3.0])
 """Where something pulls, in the body's frame, and its force [N] in the body's axes."""

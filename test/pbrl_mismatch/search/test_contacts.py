@@ -10,7 +10,7 @@ import pytest
 from pbrl_bag.types import Recording
 from pbrl_mismatch import residual_wrench, track_of
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
-from pbrl_mismatch.search.contacts import contact_points, with_contacts
+from pbrl_mismatch.search.path.contacts import contact_points, with_contacts
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7, 2.5])

@@ -1,0 +1,122 @@
+"""A hand that pushes furniture when it is asked to, as a node: the service `/push`, and the streams of a robot's wrist.
+
+What Krang does with arms and wheels, a hand does in a second: whoever chooses pushes can try them here. Simulated time
+goes on only while a push does, at `rate` simulated seconds a second.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+from typing import Any
+
+import rclpy
+from pbrl_msgs.srv import PushObject
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+from bullet_sim.errors import SimError
+from bullet_sim.scene import load_scene
+from krang_sim.errors import KrangError
+from krang_sim.hand_session import HandSession, straight_push
+from krang_sim.messages import LATCHED, message_types, to_messages
+from krang_sim.observations import ClockTick, Observation
+from krang_sim.ros.parameters import declare, refuse_unknown
+
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STREAM_QOS = QoSProfile(depth=1000)
+TOPICS = ("/clock", "/scene", "/grasps", "/wrist_ft/left")
+
+
+class HandNode(Node):
+    """Does the pushes that are asked of it, and publishes what is seen and felt.
+
+    Args:
+        stop: when it is set, a push that is under way is given up.
+
+    Raises:
+        SimError: a wrong parameter, or a scene that cannot be built.
+    """
+
+    def __init__(self, stop: threading.Event, **options: Any) -> None:
+        super().__init__("hand_node", **options)
+        scene = declare(self, "scene", "locked_caster", "scene file, or the name of a scene of the workspace")
+        seed = declare(self, "seed", 0, "seed of every random draw", (0, 2**31 - 1))
+        rate = "simulated seconds per second; 0: as fast as possible"
+        self._rate: float = declare(self, "rate", 1.0, rate, (0.0, 1000.0))
+        refuse_unknown(self)
+        self._stop, self._origin, self._at = stop, time.monotonic(), 0.0
+        self._session = HandSession(load_scene(scene), seed=seed, publish=self._publish)
+        types = message_types(self._session.tagged)
+        wanted = {*TOPICS, "/ar_tags/left_gripper/pose", *(f"/ar_tags/{name}/pose" for name in self._session.tagged)}
+        self._outputs = {
+            topic: self.create_publisher(kind, topic, LATCHED_QOS if topic in LATCHED else STREAM_QOS)
+            for topic, kind in types.items()
+            if topic in wanted
+        }
+        self._publish(self._session.latched())
+        self.create_service(PushObject, "/push", self._push)
+
+    def _push(self, request: PushObject.Request, response: PushObject.Response) -> PushObject.Response:
+        contact, way = request.contact_point, request.direction
+        self._origin = time.monotonic() - (self._at / self._rate if self._rate else 0.0)
+        try:
+            push = straight_push(
+                request.object, (contact.x, contact.y), (way.x, way.y), request.speed, request.duration
+            )
+            status = self._session.push(push)
+        except SimError as error:
+            status = " ".join(str(error).split())
+        response.success, response.message = status == "done", status
+        return response
+
+    def _publish(self, news: list[Observation]) -> None:
+        for observation in news:
+            for topic, message in to_messages(observation):
+                self._outputs[topic].publish(message)
+        self._at = next((each.time for each in news if isinstance(each, ClockTick)), self._at)
+        due = self._origin + self._at / self._rate if self._rate else 0.0
+        if self._stop.wait(max(due - time.monotonic(), 0.0)):
+            raise KrangError("the simulator was stopped in the middle of the push")
+
+    def destroy_node(self) -> None:
+        """End Bullet with the node."""
+        self._session.close()
+        super().destroy_node()
+
+
+def main() -> None:
+    """Run the node; errors at start are one line and exit code 2."""
+    node = None
+    fault = ""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    try:
+        # rclpy's own handlers would shut the context down between a step and its publication.
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        node = HandNode(stop)
+        spinner = SingleThreadedExecutor()
+        spinner.add_node(node)
+        while not stop.is_set() and node.context.ok():
+            spinner.spin_once(timeout_sec=0.1)
+    except ExternalShutdownException:
+        pass
+    except (SimError, rclpy_implementation.RCLError) as error:  # RCLError: --ros-args that cannot be read
+        fault = " ".join(str(error).split())
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    if fault:
+        print(f"hand_node: {fault}", file=sys.stderr)
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,78 @@
+"""Compiled: what every model would do to a body along one given path, as tags would see it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pbrl_mismatch.kernels.motion_kernel import BEGIN, LAST, rehearse
+from pbrl_mismatch.kernels.sense_kernel import acting, load_now, to_truth
+from pbrl_mismatch.kernels.state import STATE
+from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+REACTION = 0.1
+"""Time in which dry friction answers to the path's speed [s]: where a body stands, what smoothing leaves of its speed
+is stopped in that time and not within a step, which would be a blow."""
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def accelerate_along(
+    rows: Array,
+    path: Array,
+    felt: Array,
+    mount: Array,
+    seen: Array,
+    clock: Array,
+    span: Index,
+    pivot: Array,
+    body: Array,
+    outline: Array,
+    feet: Array,
+    stride: int,
+    out: Array,
+) -> None:
+    """Write how each row's model accelerates the body along one path, at the nominal centre of mass.
+
+    A centre of mass off the nominal one, or a tag that is, makes the true centre move on a path of its own; what it
+    does is taken back to the point that tags see.
+
+    Args:
+        rows: (P, WIDTH).
+        path: (T, 6) states of the nominal centre of mass in one episode, as tags would see it.
+        felt: see `simulate_serial`, and so are those up to `feet`.
+        mount: see `simulate_serial`.
+        seen: see `simulate_serial`.
+        clock: see `simulate_serial`.
+        span: (4,) of the episode.
+        pivot: (3,).
+        body: (4,).
+        outline: (E, 2).
+        feet: (F, 2).
+        stride: every so many steps; 1 for models in which more moves than the body.
+        out: (P, ceil(T / stride), 3) [m/s^2, m/s^2, rad/s^2], written.
+    """
+    state, com, acc, wrench = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3)
+    axes, dt = np.empty(5), REACTION
+    for r in range(rows.shape[0]):
+        p = rows[r]
+        fixed_axes(p, body[3], axes)
+        _, _ = load_now(p, clock[span[0]], body, com)
+        rehearse(p, seen, span, body, outline, feet, com, state)
+        for n in range(out.shape[1]):
+            t = n * stride
+            step = min(span[0] + t, span[LAST])
+            mass, inertia = load_now(p, clock[step], body, com)
+            to_truth(p, path[t], body, com, state)
+            rx, ry, vx, vy, omega = path[t, 0] - state[0], path[t, 1] - state[1], state[3], state[4], state[5]
+            acting(
+                p, felt, mount, seen, step, span[BEGIN], span[LAST], clock[step], clock[span[BEGIN]], body, com, wrench
+            )
+            step_body(p, state, wrench, clock[step], mass, inertia, com, pivot, outline, feet, axes, acc, dt)
+            turn = (state[5] - omega) / dt
+            out[r, n, 0] = (state[3] - vx) / dt - turn * ry - omega * omega * rx
+            out[r, n, 1] = (state[4] - vy) / dt + turn * rx - omega * omega * ry
+            out[r, n, 2] = turn

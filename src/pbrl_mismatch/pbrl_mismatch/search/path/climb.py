@@ -1,0 +1,109 @@
+"""Damped least squares (Levenberg-Marquardt) of many starts at once along a recorded path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
+from pbrl_mismatch.search.path.along import Along
+
+Array = NDArray[np.float64]
+
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-6, 1e6
+EASIER, HARDER = 0.2, 8.0
+SETTLED = 0.05
+"""A gain below this [nat] of all starts ends a climb."""
+
+
+@dataclass(frozen=True)
+class PathPeak:
+    """Where a climb along the path has come to, for P starts.
+
+    Attributes:
+        hypothesis: what was fitted.
+        coordinates: (P, K).
+        misfit: (P, W) of the data, not scaled.
+        counts: (W,) how many numbers were observed.
+        evidence: (P,) log evidence by Laplace [nat], up to what is common to all hypotheses over these windows.
+    """
+
+    hypothesis: Hypothesis
+    coordinates: Array
+    misfit: Array
+    evidence: Array
+    counts: Array
+
+    @property
+    def noise_scale(self) -> float:
+        """Return the least scale of the noise over all windows that a start needs, at least one."""
+        return float(np.sqrt(max(1.0, self.misfit.sum(axis=1).min() / self.counts.sum())))
+
+
+def weights(along: Along, misfit: Array) -> Array:
+    """Return (P, W) one over the square of each window's scale: its best one that is at least one."""
+    return 1.0 / np.maximum(1.0, misfit / along.counts)
+
+
+def likelihood(along: Along, misfit: Array) -> Array:
+    """Return (P,) log likelihoods at the windows' best scales, up to what is common to all hypotheses [nat]."""
+    weight = weights(along, misfit)
+    return along.log_det + np.sum(-0.5 * misfit * weight + 0.5 * along.counts * np.log(weight), axis=1)
+
+
+def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations: int) -> PathPeak:
+    """Minimise from many starts.
+
+    Args:
+        along: windows along a path.
+        hypothesis: what is free.
+        starts: (P, K).
+        iterations: steps at most.
+    """
+    u, count, free = starts.copy(), len(starts), starts.shape[1]
+    steps, spread, mean = step_sizes(hypothesis), hypothesis.spread, hypothesis.mean
+    damping, most = np.full(count, FIRST_DAMPING), 3.0 * spread
+    moves = np.concatenate([np.zeros((1, free)), np.diag(steps)])
+
+    def prior(points: Array) -> Array:
+        return np.sum(((points - mean) / spread) ** 2, axis=1)
+
+    def linear(points: Array) -> tuple[Array, Array]:
+        rows = hypothesis.rows((points[:, None] + moves).reshape(-1, free))
+        found = along.residual(rows).reshape(len(points), 1 + free, *along.operator.shape[1:2], -1)
+        slope = (found[:, :1] - found[:, 1:]) / steps[None, :, None, None]
+        return found[:, 0], np.clip(np.moveaxis(slope, 1, -1), -1e5, 1e5)
+
+    def normal(residual: Array, slope: Array, weight: Array) -> tuple[Array, Array]:
+        scaled = slope * np.sqrt(weight)[:, :, None, None]
+        flat = scaled.reshape(len(scaled), -1, free)
+        rest = (residual * np.sqrt(weight)[:, :, None]).reshape(len(scaled), -1, 1)
+        return np.swapaxes(flat, 1, 2) @ flat, (np.swapaxes(flat, 1, 2) @ rest)[..., 0]
+
+    residual, slope = linear(u)
+    misfit = np.sum(residual**2, axis=2)
+    for _ in range(iterations):
+        matrix, vector = normal(residual, slope, weights(along, misfit))
+        cost = -2.0 * likelihood(along, misfit) + prior(u)
+        curvature = matrix + np.diag(spread**-2.0)
+        pull = vector - (u - mean) / spread**2
+        diagonal = curvature * np.eye(free)
+        step = np.linalg.solve(curvature + damping[:, None, None] * diagonal, pull[..., None])[..., 0]
+        step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
+        there_residual, there_slope = linear(u + step)
+        there = np.sum(there_residual**2, axis=2)
+        gained = 0.5 * (cost - (-2.0 * likelihood(along, there) + prior(u + step)))
+        better = gained > 0.0
+        u = np.where(better[:, None], u + step, u)
+        misfit = np.where(better[:, None], there, misfit)
+        residual = np.where(better[:, None, None], there_residual, residual)
+        slope = np.where(better[:, None, None, None], there_slope, slope)
+        damping = np.clip(damping * np.where(better, EASIER, HARDER), LEAST_DAMPING, MOST_DAMPING)
+        if float(np.max(np.where(better, gained, 0.0))) < SETTLED and float(damping.min()) > 1.0:
+            break
+    matrix, _ = normal(residual, slope, weights(along, misfit))
+    _, log_det = np.linalg.slogdet(matrix * np.outer(spread, spread) + np.eye(free))
+    evidence = likelihood(along, misfit) - 0.5 * prior(u) - 0.5 * log_det
+    return PathPeak(hypothesis, u, misfit, evidence, along.counts)

@@ -1,0 +1,168 @@
+"""What effects are laid on: a fitted hypothesis along the path that it and a left-out wrench together explain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.data.cuts import Cuts
+from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
+from pbrl_mismatch.effects.registry import EFFECTS
+from pbrl_mismatch.kernels.columns import COLUMN
+from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
+from pbrl_mismatch.search.path.along import Along, as_seen_path, lay_along
+from pbrl_mismatch.search.path.climb import climb_along, weights
+
+Array = NDArray[np.float64]
+
+COARSE, MIDDLING, FINE = 8, 4, 1
+"""Steps between accelerations: for a first look, for a climb, and where more moves than the body."""
+ITERATIONS = 5
+
+
+@dataclass(frozen=True)
+class Look:
+    """Windows along a path beside what a ground does there, all over the noise of the ground's windows.
+
+    Attributes:
+        along: the windows.
+        weight: (1, W, 1) roots of the windows' weights under the ground.
+        still: (R,) residuals of the ground.
+        slope: (K, R) how they change with its coordinates, in units of their priors.
+    """
+
+    along: Along
+    weight: Array
+    still: Array
+    slope: Array
+
+    def residual(self, rows: Array) -> Array:
+        """Return (P, R) residuals of models (P, WIDTH)."""
+        return (self.along.residual(rows) * self.weight).reshape(len(rows), -1)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A fitted hypothesis along its path.
+
+    Attributes:
+        hypothesis: that effects are laid on.
+        coordinates: (K,) its best along the path.
+        cuts: windows.
+        floor: size of a sensor's own error [N].
+        lacks: the wrench that it lacks, and the path.
+    """
+
+    hypothesis: Hypothesis
+    coordinates: Array
+    cuts: Cuts
+    floor: float
+    lacks: ResidualWrench
+
+    @property
+    def row(self) -> Array:
+        """Return (WIDTH,) its parameter row."""
+        return self.hypothesis.rows(self.coordinates[None])[0]
+
+    def along(self, stride: int) -> Along:
+        """Return the windows along its path."""
+        return laid(self.cuts, self.row, self.lacks, self.floor, stride)
+
+    @cached_property
+    def climbed(self) -> Along:
+        """Return the windows that bodies without a memory are climbed along."""
+        return self.along(MIDDLING)
+
+    @cached_property
+    def first(self) -> Look:
+        """Return what draws are compared with."""
+        return self._look(self.along(COARSE))
+
+    @cached_property
+    def fine(self) -> Look:
+        """Return the same step by step."""
+        return self._look(self.along(FINE))
+
+    def _look(self, along: Along) -> Look:
+        steps = step_sizes(self.hypothesis)
+        moved = self.coordinates + np.concatenate([np.zeros((1, len(steps))), np.diag(steps)])
+        found = along.residual(self.hypothesis.rows(moved))
+        weight = np.sqrt(weights(along, np.sum(found[:1] ** 2, axis=2)))[:, :, None]
+        flat = (found * weight).reshape(len(found), -1)
+        slope = (flat[:1] - flat[1:]) / steps[:, None] * self.hypothesis.spread[:, None]
+        return Look(along, weight, flat[0], slope)
+
+
+def laid(cuts: Cuts, row: Array, lacks: ResidualWrench, floor: float, stride: int) -> Along:
+    """Return windows along the path that a model (WIDTH,) and the wrench that it lacks explain together."""
+    path = as_seen_path(cuts.track, row, lacks.state)
+    return lay_along(cuts, path, float(row[COLUMN["mass"]]), floor, stride)
+
+
+def ground_of(hypothesis: Hypothesis, coordinates: Array, cuts: Cuts, floor: float) -> Ground:
+    """Fit a hypothesis along its own path, from coordinates (K,)."""
+    found = traced(hypothesis, coordinates[None], cuts, floor)
+    row = hypothesis.rows(found.coordinates[None])[0]
+    return Ground(hypothesis, found.coordinates, cuts, floor, residual_wrench(cuts.track, row, size=found.size))
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A hypothesis fitted along the path that it and a left-out wrench together explain.
+
+    Attributes:
+        hypothesis: what was fitted.
+        coordinates: (K,).
+        evidence: log evidence by Laplace [nat], on the scale of simulated windows.
+        noise_scale: scale of the noise that it needs, at least one.
+        size: of the left-out force [N].
+        along: the windows.
+    """
+
+    hypothesis: Hypothesis
+    coordinates: Array
+    evidence: float
+    noise_scale: float
+    size: float
+    along: Along
+
+
+def traced(hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float) -> Traced:
+    """Fit a hypothesis along its own path.
+
+    Args:
+        hypothesis: what is free.
+        starts: (n, K); the path is that of the first.
+        cuts: windows.
+        floor: size of a sensor's own error [N].
+    """
+    row = hypothesis.rows(starts[:1])[0]
+    lacks = residual_wrench(cuts.track, row)
+    remembers = any(EFFECTS[name].remembers for name in hypothesis.effects)
+    along = laid(cuts, row, lacks, floor, FINE if remembers else MIDDLING)
+    found = climb_along(along, hypothesis, starts, ITERATIONS)
+    best = int(np.argmax(found.evidence))
+    scale = float(np.sqrt(max(1.0, found.misfit[best].sum() / along.counts.sum())))
+    return Traced(hypothesis, found.coordinates[best], float(found.evidence[best]), scale, lacks.size, along)
+
+
+def traced_score(found: Traced, kept: Cuts, whole: Cuts, floor: float) -> float:
+    """Return the log density of windows that are not kept, given those that are [nat]: evidence over evidence.
+
+    Args:
+        found: a fit to all windows.
+        kept: windows to fit to.
+        whole: those, and the ones that are held out.
+        floor: size of a sensor's own error [N].
+    """
+    mass = float(found.hypothesis.rows(found.coordinates[None])[0, COLUMN["mass"]])
+    start, evidence = found.coordinates[None], []
+    for cuts in (kept, whole):
+        along = lay_along(cuts, found.along.path, mass, floor, found.along.stride)
+        fitted = climb_along(along, found.hypothesis, start, ITERATIONS)
+        start = fitted.coordinates
+        evidence.append(float(fitted.evidence[0]))
+    return evidence[1] - evidence[0]
