@@ -251,10 +251,14 @@ def bench(
     most: Annotated[
         int | None, typer.Option(min=1, help="Recordings an effect at most, and ten times as many clean ones.")
     ] = None,
+    minutes: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="After which no recording is begun; what there is is reported, and goes on later."),
+    ] = None,
 ) -> int:
     """Measure one group of acceptance rows; the last line is the report as JSON."""
     wanted = [each.strip() for each in sets.split(",")] if sets is not None else []
-    return _hand_over("bench", name=name, out=out, seed=seed, quick=quick, sets=wanted, most=most)
+    return _hand_over("bench", name=name, out=out, seed=seed, quick=quick, sets=wanted, most=most, minutes=minutes)
 
 
 @app.command(epilog="Example: ./pbrl experiment sample-efficiency --quick")

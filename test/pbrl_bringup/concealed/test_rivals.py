@@ -36,7 +36,6 @@ def given(wrench: np.ndarray, state: np.ndarray, sd: float = 0.1) -> Any:
         sd=np.full((COUNT, 3), sd),
         open=np.ones(COUNT, dtype=bool),
         heldout=None,
-        seconds=0.0,
     )
 
 

@@ -13,11 +13,10 @@ import pytest
 from scipy.stats import binomtest
 
 from pbrl_bringup.benches.concealed_figures import confusion, draw_all
-from pbrl_bringup.benches.concealed_rows import interval, rows_of
+from pbrl_bringup.benches.concealed_rows import interval, mean_interval, median_interval, rows_of
 from pbrl_bringup.concealed.localisation import Localised, f1, localise
 from pbrl_bringup.concealed.places import border_error, moment_error, parameter_bias, place_error
 from pbrl_bringup.concealed.scoring import (
-    DETECTABLE,
     Comparison,
     Oracle,
     RivalScore,
@@ -139,7 +138,7 @@ def test_places_moments_and_bias_of_what_was_named_right() -> None:
 
 
 def test_gain_strength_and_abstention_against_an_oracle() -> None:
-    told = score("one", TRUTH, report(["tether"], []), TRUTH.seal(), 3.0, oracle=Oracle(0.01, 9.0 * DETECTABLE))
+    told = score("one", TRUTH, report(["tether"], []), TRUTH.seal(), 3.0, oracle=Oracle(0.01, 60.0, 3.0))
     assert told.gain == pytest.approx(1.0) and told.times_detectable == pytest.approx(3.0)
     wrong = score("one", TRUTH, report(["detent"], []), TRUTH.seal(), 3.0, oracle=Oracle(0.0095, 9.0))
     assert wrong.abstained  # it predicts as well as the oracle
@@ -176,8 +175,10 @@ def many() -> list[Score]:
     alarm = score("clean2", clean, report(["detent"], []), clean.seal(), 2.0, group="clean")
     at = Localised(0.9, math.nan, 0.8, 0.8)
     beside = {"LISDD": RivalScore(0.5, math.nan, 0.4, 0.4, 0.04, 1.0)}
-    right = replace(scored(["tether"], []), located=at, rivals=beside, oracle=0.01, oracle_gain=100.0, share=0.3)
-    wrong = replace(scored(["detent"], ["tether"]), located=at, rivals=beside, oracle=0.01, oracle_gain=1.0, share=0.3)
+    right = replace(scored(["tether"], []), located=at, rivals=beside, oracle=0.01, times_detectable=4.0, share=0.3)
+    wrong = replace(
+        scored(["detent"], ["tether"]), located=at, rivals=beside, oracle=0.01, times_detectable=0.4, share=0.3
+    )
     gone = replace(scored([], ["detent"], unknown=True), set="withheld", withheld=("tether",))
     broken = failed_score("broken", TRUTH, "seal", "ERROR: no", "single", ())
     return [silent, alarm, right, wrong, gone, broken]
@@ -190,13 +191,35 @@ def test_rows_say_what_was_measured() -> None:
     assert rows["single: effect among the first two, share of 3 recordings"].value == pytest.approx(2 / 3)
     strong = rows["single: effect named first at 3 times the detectable strength, share of 1 recordings"]
     assert strong.value == 1.0 and strong.holds and strong.against["weaker_than_an_oracle_detects"] == 1
-    what = "held-out position error before over after, median of the cases named right"
+    what = "held-out position error before over after, where named right, median of 1"
     assert rows[what].value == pytest.approx(5.0) and rows[what].against["LISDD"] == pytest.approx(1.25)
     assert rows["withheld: unknown, or a name that predicts as well as the oracle, share of 1 recordings"].value == 1.0
-    time = rows["localisation F1 (time) of effects that act for part of the time, mean"]
+    time = rows["localisation F1 (time) of effects that act for part of the time, mean of 2"]
     assert time.value == pytest.approx(0.9) and time.against["LISDD"] == pytest.approx(0.5)
-    assert rows["localisation F1 (time) over the best of the four beside it"].value == pytest.approx(0.4)
-    assert rows["CPU time of a diagnosis, median"].against["ended_with_an_error"] == 1
+    over = "localisation F1 (time) of effects that act for part of the time: over the best of the four beside it"
+    assert (
+        rows[f"{over}, mean of 2"].value == pytest.approx(0.4) and rows[f"{over}, mean of 2"].against["best"] == "LISDD"
+    )
+    spent = rows["CPU time of a diagnosis, without its start and its page, median of 5"]
+    assert spent.against["failed"] == 1 and spent.value == 3.0
+
+
+@pytest.mark.parametrize("count", [6, 9, 40])
+def test_a_median_s_interval_covers_it_as_often_as_it_says(count: int) -> None:
+    rng = np.random.default_rng(count)
+    ends = [
+        [float(end) for end in median_interval(rng.exponential(size=count).tolist()).split(" to ")] for _ in range(2000)
+    ]
+    covered = np.mean([low <= math.log(2.0) <= high for low, high in ends])
+    assert 0.94 < covered < 0.995
+    assert median_interval([1.0, 2.0, math.nan]) == "-inf to inf"
+
+
+def test_a_mean_s_interval_is_about_it_and_the_same_each_time() -> None:
+    values = [*np.random.default_rng(1).normal(0.5, 0.1, 100).tolist(), math.nan]
+    low, high = (float(end) for end in mean_interval(values).split(" to "))
+    assert low < 0.5 < high and high - low == pytest.approx(4.0 * 0.1 / 10.0, rel=0.2)
+    assert mean_interval(values) == mean_interval(values) and mean_interval([1.0]) == "-inf to inf"
 
 
 def test_figures_are_drawn(tmp_path: Path) -> None:

@@ -16,12 +16,14 @@ from pbrl_bringup.concealed.draws import DRAWS
 from pbrl_bringup.concealed.furnished import PART_OF_IT
 from pbrl_bringup.concealed.sets import (
     FIRST_SEED,
+    MASS_OFF,
     OUTLINE_OFF,
     QUICK_EFFECTS,
     SETS,
     SPARE_STEP,
     SPARES,
     draw_pairs,
+    evenly,
     go_together,
     told_roughly,
     trials_of,
@@ -68,6 +70,28 @@ def test_no_recording_is_in_two_sets_or_two_seeds_and_none_is_for_development() 
     assert all(not by_set[a] & by_set[b] for a, b in itertools.combinations(by_set, 2))
 
 
+def test_every_beginning_of_the_order_has_its_share_of_each_set_and_effect() -> None:
+    trials = evenly(trials_of(0, quick=False))
+    assert sorted(each.name for each in trials) == sorted(each.name for each in trials_of(0, quick=False))
+    for part in (0.25, 0.5, 0.8):
+        begun = trials[: round(part * len(trials))]
+        for name in SETS:
+            here, whole = (sum(each.set == name for each in some) for some in (begun, trials))
+            assert abs(here - part * whole) <= 1.0
+        counts = Counter(each.case.effects for each in begun if each.set == "single")
+        assert max(counts.values()) - min(counts.values()) <= 1
+
+
+def test_a_folder_s_name_says_nothing_of_what_is_concealed() -> None:
+    trials = trials_of(0, quick=False)
+    assert len({each.folder for each in trials}) == len(trials)
+    assert all(set(each.folder) <= set("0123456789abcdef") for each in trials)
+    assert {str(each.options) for each in trials if each.set in ("clean", "single", "pairs", "furnished")} == {"{}"}
+    withheld = next(each for each in trials if each.set == "withheld")
+    assert withheld.options == {"without": list(withheld.withheld)}
+    assert next(each for each in trials if each.set == "rough").options == {"mass_spread": MASS_OFF}
+
+
 def test_a_quick_run_is_small_and_sets_can_be_chosen() -> None:
     assert {each.set for each in trials_of(0, quick=True)} == {"clean", "single"}
     assert {e.case.effects[0] for e in trials_of(0, True, ["rough"])} == set(QUICK_EFFECTS)
@@ -81,6 +105,8 @@ def test_a_quick_run_is_small_and_sets_can_be_chosen() -> None:
         command("wheel", None, 0, True, ["clean"], None)
     with pytest.raises(BringupError, match="bench wheel: expected no --most"):
         command("wheel", None, 0, True, [], 2)
+    with pytest.raises(BringupError, match="bench wheel: expected no --minutes"):
+        command("wheel", None, 0, True, [], None, 2.0)
 
 
 def test_pairs_are_sensible_and_the_same_for_the_same_seed() -> None:

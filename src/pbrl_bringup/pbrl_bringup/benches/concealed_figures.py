@@ -27,15 +27,18 @@ def draw_all(scores: Sequence[Score], out: Path) -> None:
         return
     shown = [each for each in scores if each.set in ("clean", "single")]
     pages = {"figure.png": confusion(shown) if shown else None, "p_values.png": p_values(scores)}
+    for name in dict.fromkeys(each.set for each in scores if each not in shown):
+        pages[f"confusion_{name}.png"] = confusion([each for each in scores if each.set == name], name)
     pages |= {"strength.png": strength(scores), "heldout.png": held_out(scores)}
     for name, page in pages.items():
         if page is not None:
             page.savefig(out / name, dpi=110)
 
 
-def confusion(scores: Sequence[Score]) -> Figure:
-    """Draw what was concealed against what was named first."""
-    rows = list(dict.fromkeys("+".join(s.effects) or "nothing" for s in scores))
+def confusion(scores: Sequence[Score], name: str = "") -> Figure:
+    """Draw what was concealed against what was named first, of a set that has a name or of those that need none."""
+    told = list(dict.fromkeys("+".join(s.effects) or "nothing" for s in scores))
+    rows = [*(each for each in DRAWS if each in told), *(each for each in told if each not in DRAWS)]
     columns = [*dict.fromkeys([*DRAWS, *(name for s in scores for name in s.named[:1])]), "unknown", "nothing"]
     counts = np.zeros((len(rows), len(columns)))
     for each in scores:
@@ -53,7 +56,8 @@ def confusion(scores: Sequence[Score]) -> Figure:
     axes.set_yticks(range(len(rows)), rows, fontsize=8)
     axes.set_xlabel("named first")
     axes.set_ylabel("concealed")
-    axes.set_title("What was concealed, and what the diagnosis named (recordings)", fontsize=10)
+    of = f"{name}: what" if name else "What"
+    axes.set_title(f"{of} was concealed, and what the diagnosis named first ({len(scores)} recordings)", fontsize=10)
     return page
 
 

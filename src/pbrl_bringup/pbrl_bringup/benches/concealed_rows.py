@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta, kstest
+from scipy.stats import beta, binom, kstest
 
 from pbrl_bringup.benches.rows import Row, at_least, at_most
 from pbrl_bringup.concealed.scoring import ALWAYS, Score
@@ -19,6 +19,7 @@ BORDERS = {"floor_patch": 0.05, "hidden_obstacle": 0.05, "second_wheel": 0.05, "
 MOMENTS = {"payload_change": "load change", "unseen_body": "first contact with an unseen body"}
 GOALS = {"single": (0.90, 0.97), "rough": (0.85, 0.95)}
 """Shares of first and among the first two, by set."""
+BOOTSTRAPS = 2000
 LOCALISED = {"time": 0.90, "region": 0.90, "regime": 0.90}
 
 
@@ -27,7 +28,7 @@ def rows_of(scores: Sequence[Score]) -> list[Row]:
     by_set = {name: [each for each in scores if each.set == name] for name in dict.fromkeys(s.set for s in scores)}
     rows: list[Row] = []
     if by_set.get("clean"):
-        rows.append(_alarms(by_set["clean"]))
+        rows += _alarms(by_set["clean"])
     for name, goals in GOALS.items():
         if by_set.get(name):
             rows += _named(name, by_set[name], goals)
@@ -46,7 +47,10 @@ def rows_of(scores: Sequence[Score]) -> list[Row]:
         rows += [*_repaired(hidden), *_placed(hidden), *_timed(hidden), *_localised(hidden)]
     spent = [each.seconds for each in scores if not math.isnan(each.seconds)]
     failed = sum(bool(each.failed) for each in scores)
-    return [*rows, at_most("CPU time of a diagnosis, median", _median(spent), "s", 60.0, ended_with_an_error=failed)]
+    return [
+        *rows,
+        _middle(at_most, "CPU time of a diagnosis, without its start and its page", spent, "s", 60.0, failed=failed),
+    ]
 
 
 def interval(hits: int, count: int, level: float = 0.95) -> str:
@@ -59,17 +63,43 @@ def interval(hits: int, count: int, level: float = 0.95) -> str:
     return f"{low:.3f} to {high:.3f}"
 
 
-def _alarms(clean: Sequence[Score]) -> Row:
-    alarms = sum(each.mismatch for each in clean)
+def median_interval(values: Sequence[float], level: float = 0.95) -> str:
+    """Return the interval of a median between order statistics, exact whatever the distribution; infinite if few."""
+    known = sorted(value for value in values if not math.isnan(value))
+    skipped = int(binom.ppf((1.0 - level) / 2.0, len(known), 0.5)) if known else 0
+    if skipped == 0:
+        return "-inf to inf"
+    return f"{known[skipped - 1]:.4g} to {known[-skipped]:.4g}"
+
+
+def mean_interval(values: Sequence[float], level: float = 0.95) -> str:
+    """Return the interval of a mean by bootstrap, the same each time; a single value says nothing."""
+    known = np.array([value for value in values if not math.isnan(value)])
+    if len(known) < 2:
+        return "-inf to inf"
+    means = np.random.default_rng(0).choice(known, (BOOTSTRAPS, len(known))).mean(axis=1)
+    low, high = np.quantile(means, [(1.0 - level) / 2.0, (1.0 + level) / 2.0])
+    return f"{low:.3f} to {high:.3f}"
+
+
+def _middle(
+    judged: Callable[..., Row], what: str, values: Sequence[float], unit: str, goal: float, **against: float | str
+) -> Row:
+    """Return a row of a median, with the count behind it and its interval."""
+    count = sum(not math.isnan(value) for value in values)
+    told = {"interval": median_interval(values), **against}
+    return judged(f"{what}, median of {count}", _median(values), unit, goal, **told)
+
+
+def _alarms(clean: Sequence[Score]) -> list[Row]:
     known = [each.p_value for each in clean if not math.isnan(each.p_value)]
-    return at_most(
-        f"false alarms on {len(clean)} clean recordings at the 5 % level, share",
-        alarms / len(clean),
-        "1",
-        0.05,
-        interval=interval(alarms, len(clean)),
-        p_of_uniform_p_values=float(kstest(known, "uniform").pvalue) if len(known) > 1 else math.nan,
-    )
+    alarms, count = sum(each.mismatch for each in clean), len(clean)
+    even = float(kstest(known, "uniform").pvalue) if len(known) > 1 else math.nan
+    what = f"false alarms on {count} clean recordings at the 5 % level, share"
+    return [
+        at_most(what, alarms / count, "1", 0.05, interval=interval(alarms, count), alarms=alarms),
+        at_least(f"p-values of {len(known)} clean recordings against even ones, p of Kolmogorov", even, "1", 0.05),
+    ]
 
 
 def _named(name: str, scores: Sequence[Score], goals: tuple[float, float]) -> list[Row]:
@@ -112,25 +142,14 @@ def _repaired(scores: Sequence[Score]) -> list[Row]:
     right = [each for each in scores if each.first and each.after > 0.0]
     ratios = [each.before / each.after for each in right]
     oracles = [each.before / each.oracle for each in right if each.oracle > 0.0]
-    gains = [each.gain for each in scores if each.mismatch and not math.isnan(each.gain)]
+    gains = [each.gain for each in scores if each.mismatch]
+    others = {name: _median(_rival(right, name, _ratio)) for name in _rivals(scores)}
+    others |= {"oracle": _median(oracles)}
+    others |= {"noise_floor": _median([each.before / each.floor for each in right if each.floor > 0.0])}
+    what = "held-out position error before over after, where named right"
     return [
-        at_least(
-            "held-out position error before over after, median of the cases named right",
-            _median(ratios),
-            "1",
-            5.0,
-            cases=len(ratios),
-            oracle=_median(oracles),
-            noise_floor=_median([each.before / each.floor for each in right if each.floor > 0.0]),
-            **{name: _median(_rival(right, name, _ratio)) for name in _rivals(scores)},
-        ),
-        at_least(
-            "held-out gain as a share of a told oracle's, median of the cases noticed",
-            _median(gains),
-            "1",
-            0.80,
-            cases=len(gains),
-        ),
+        _middle(at_least, what, ratios, "1", 5.0, **others),
+        _middle(at_least, "held-out gain as a share of a told oracle's, where noticed", gains, "1", 0.80),
     ]
 
 
@@ -144,8 +163,8 @@ def _placed(scores: Sequence[Score]) -> list[Row]:
     for effect, limit in BORDERS.items():
         found = [each.places[effect] for each in scores if effect in each.places]
         within = sum(value <= limit for value in found)
-        what = f"place of {effect} where it is named, median off"
-        rows.append(at_most(what, _median(found), "m", limit, cases=len(found), within_it=interval(within, len(found))))
+        told = {"within_it": f"{within} of {len(found)}", "share_within_it": interval(within, len(found))}
+        rows.append(_middle(at_most, f"place of {effect} where it is named, off", found, "m", limit, **told))
     return rows
 
 
@@ -153,7 +172,7 @@ def _timed(scores: Sequence[Score]) -> list[Row]:
     rows = []
     for effect, what in MOMENTS.items():
         found = [each.moments[effect] for each in scores if effect in each.moments]
-        rows.append(at_most(f"time of {what}, median off", _median(found), "s", 0.1, cases=len(found)))
+        rows.append(_middle(at_most, f"time of {what}, off", found, "s", 0.1))
     return rows
 
 
@@ -163,19 +182,29 @@ def _localised(scores: Sequence[Score]) -> list[Row]:
     rows: list[Row] = []
     for kind, goal in LOCALISED.items():
         cases = [each for each in partly if not math.isnan(getattr(each.located, kind))]
-        ours = _average([getattr(each.located, kind) for each in cases])
-        others = {name: _average(_rival(cases, name, _of(kind))) for name in _rivals(scores)}
-        what = f"localisation F1 ({kind}) of effects that act for part of the time, mean"
-        rows.append(at_least(what, ours, "1", goal, cases=len(cases), **others))
-        best = max(others.values(), default=math.nan)
-        rows.append(at_least(f"localisation F1 ({kind}) over the best of the four beside it", ours - best, "1", 0.0))
+        rows += _beside(f"localisation F1 ({kind}) of effects that act for part of the time", cases, kind, goal)
     everything = [each for each in scores if not math.isnan(each.located.time)]
-    others = {name: _average(_rival(everything, name, _of("time"))) for name in _rivals(scores)}
-    ours = _average([each.located.time for each in everything])
-    rows.append(
-        at_least("localisation F1 (time) of all effects, mean", ours, "1", 0.90, cases=len(everything), **others)
+    overlap = _average([each.located.overlap for each in partly])
+    return [
+        *rows,
+        _beside("localisation F1 (time) of all effects", everything, "time", 0.90, overlap_of_partial=overlap)[0],
+    ]
+
+
+def _beside(what: str, cases: Sequence[Score], kind: str, goal: float, **more: float) -> list[Row]:
+    """Return the mean of an F1 beside the rivals', and by how much it is above the best of theirs."""
+    ours = [getattr(each.located, kind) for each in cases]
+    theirs = {name: _rival(cases, name, _of(kind)) for name in _rivals(cases)}
+    means = {name: _average(values) for name, values in theirs.items()}
+    row = at_least(
+        f"{what}, mean of {len(cases)}", _average(ours), "1", goal, interval=mean_interval(ours), **means, **more
     )
-    return rows
+    best = max(means, key=means.__getitem__, default="")
+    of = _of(kind)
+    above = [getattr(each.located, kind) - of(each, best) for each in cases if best in each.rivals]
+    told = {"interval": mean_interval(above), "best": best}
+    over = f"{what}: over the best of the four beside it, mean of {len(above)}"
+    return [row, at_least(over, _average(above), "1", 0.0, **told)]
 
 
 def _of(kind: str) -> Callable[[Score, str], float]:

@@ -11,7 +11,7 @@ from pbrl_bringup.errors import BringupError
 BENCHES = {
     "sim": "a pushed table against a hand calculation, kinematics, speed",
     "wheel": "the wheel of tables with a locked caster, and held-out prediction",
-    "cabinet": "the hinge of a real cabinet pulled by a real PR2",
+    "cabinet": "two real cabinets pulled by a real PR2: hinge, catch, held-out force",
     "recorder": "a recorder killed in mid-run",
     "mcap": "recordings read by two independent readers",
     "kernel": "steps a second of the compiled world model, against pymunk",
@@ -27,7 +27,15 @@ WITH_SETS = ("concealed",)
 """Benches whose cases come in sets."""
 
 
-def command(name: str, out: Path | None, seed: int, quick: bool, sets: list[str], most: int | None) -> int:
+def command(
+    name: str,
+    out: Path | None,
+    seed: int,
+    quick: bool,
+    sets: list[str],
+    most: int | None,
+    minutes: float | None = None,
+) -> int:
     """Run one bench.
 
     Args:
@@ -37,6 +45,7 @@ def command(name: str, out: Path | None, seed: int, quick: bool, sets: list[str]
         quick: whether to do a smaller version.
         sets: which sets of cases, for a bench that has some; none: all.
         most: recordings an effect at most, for a bench that has sets; None: all.
+        minutes: after which a bench that has sets begins no recording; None: it does all.
 
     Raises:
         BringupError: there is no bench of that name, it has no sets, or none of such a name.
@@ -47,6 +56,11 @@ def command(name: str, out: Path | None, seed: int, quick: bool, sets: list[str]
         raise BringupError(
             f"bench {name}: expected no --most, got {most}; {', '.join(WITH_SETS)} has recordings to count"
         )
+    if minutes is not None and name in BENCHES and name not in WITH_SETS:
+        raise BringupError(
+            f"bench {name}: expected no --minutes, got {minutes:g}; {', '.join(WITH_SETS)} can go on later"
+        )
     more: dict[str, Any] = {"sets": sets} if sets else {}
     more |= {} if most is None else {"most": most}
+    more |= {} if minutes is None else {"minutes": minutes}
     return run_measured("bench", BENCHES, name, out, seed, quick, more)

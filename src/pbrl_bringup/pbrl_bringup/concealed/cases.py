@@ -7,22 +7,26 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bullet_sim.errors import SimError
 from bullet_sim.hand_recording import Activity, HandRecording
 from pbrl_bag.types import Recording
 from pbrl_bringup.concealed.draws import DRAWS
-from pbrl_bringup.concealed.oracle import seen
+from pbrl_bringup.concealed.oracle import Oracle, lay_out, seen
 from pbrl_bringup.concealed.recording import to_recording
 from pbrl_bringup.concealed.stage import NAME, Stage, draw_stage, play, saturated
 from pbrl_bringup.concealed.told import told_values
 from pbrl_bringup.concealed.truth import Truth
 from pbrl_bringup.errors import BringupError
+from pbrl_mismatch.search.told_baseline import ToldBaseline
 
 TRIES = 8
 """Draws of an effect before a case counts as one that cannot be made."""
 LEAST_SHARE = 0.02
 """Of the time in which the table moves: an effect that acts for less is drawn again."""
+LEAST_MOVING = 0.25
+"""Share of the time that a table has to move."""
 FIRST_POSES = 5
 """Poses of the gripper from which its turn against the body is taken."""
 PLACES = {"floor_patch": "polygon", "hidden_obstacle": "polygon", "second_wheel": "position", "hidden_hinge": "point"}
@@ -47,18 +51,32 @@ class Case:
         return f"{'+'.join(self.effects) or 'clean'}-{self.seed}"
 
 
-def make(case: Case, draw: Callable[[np.random.Generator], Stage] = draw_stage) -> tuple[Recording, Truth]:
+Learn = Callable[[Stage], ToldBaseline]
+
+
+@dataclass(frozen=True)
+class Made:
+    """What the simulation of a case gave: the recording, the truth, and what a told oracle makes of it, if asked."""
+
+    recording: Recording
+    truth: Truth
+    oracle: Oracle | None = None
+
+
+def make(case: Case, draw: Callable[[np.random.Generator], Stage] = draw_stage, learn: Learn | None = None) -> Made:
     """Simulate a case; the same case makes the same recording.
 
     Args:
         case: what to conceal.
         draw: of the stage.
+        learn: what is learned of the stage's table before anything is concealed; None: nothing.
 
     Raises:
         BringupError: no draw of the effects leads to a recording in which they act.
     """
     rng = np.random.default_rng([case.seed, *(sum(map(ord, name)) for name in case.effects)])
     stage = draw(rng)
+    baseline = None if learn is None else learn(stage)
     why = ""
     least = 0.0
     for _ in range(TRIES):
@@ -72,19 +90,39 @@ def make(case: Case, draw: Callable[[np.random.Generator], Stage] = draw_stage) 
             why = str(error).splitlines()[-1]
             continue
         truth = _truth(case, stage, concealed, made, strength)
-        if made.status == "done" and not saturated(made) and min(truth.share.values(), default=1.0) >= LEAST_SHARE:
-            recording = to_recording(made, stage.with_concealed(concealed))
-            if not case.effects or seen(recording, truth):
-                return recording, truth
-            why, least = "an effect too weak for an oracle that is told", strength
+        why = _spoilt(made, truth)
+        if why:
             continue
-        why = made.status if made.status != "done" else f"acting shares {truth.share}"
+        recording = to_recording(made, stage.with_concealed(concealed))
+        if not case.effects:
+            return Made(recording, truth)
+        found = seen(lay_out(recording, NAME, baseline), truth)
+        if found is not None:
+            return Made(recording, truth, found)
+        why, least = "an effect too weak for an oracle that is told", strength
     raise BringupError(f"{case.name}: expected one of {TRIES} draws to act and to be done, got {why} in the last")
+
+
+def _spoilt(made: HandRecording, truth: Truth) -> str:
+    """Say why a recording does not count, or nothing."""
+    if made.status != "done":
+        return made.status
+    if saturated(made):
+        return "a wrist sensor at its end"
+    if moves(made).mean() < LEAST_MOVING:
+        return f"a table that moves in {100.0 * moves(made).mean():.0f} % of the time"
+    return f"acting shares {truth.share}" if min(truth.share.values(), default=1.0) < LEAST_SHARE else ""
+
+
+def moves(made: HandRecording) -> NDArray[np.bool_]:
+    """Return (n,) when the table moves, at the rate of the simulator's truth."""
+    twist = made.bodies[NAME].twist
+    return np.asarray(np.hypot(*twist[:, :2].T) + 0.5 * np.abs(twist[:, 2]) > 0.02)
 
 
 def _truth(case: Case, stage: Stage, concealed: dict[str, Any], made: HandRecording, strength: float) -> Truth:
     """Put the truth together; when an effect acts comes from the simulator."""
-    moving = np.hypot(*made.bodies[NAME].twist[:, :2].T) + 0.5 * np.abs(made.bodies[NAME].twist[:, 2]) > 0.02
+    moving = moves(made)
     when, share, place = {}, {}, {}
     for effect in case.effects:
         acts = [activity for activity in made.activities.values() if activity.effect == effect]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ Draw = Callable[[np.random.Generator, Stage, float], dict[str, object]]
 GRAVITY = 9.81
 DRIFTING = 10.0
 """A drift is as large as a step after so long [s]."""
+NEAR_AXLE = 0.01
+"""Of a pin from a wheel's axle, as a standard deviation [m]."""
 FREE = 0.02
 """Between a hidden body and the table as it stands at the start [m]."""
 
@@ -115,9 +118,19 @@ def detent(rng: np.random.Generator, stage: Stage, strength: float) -> dict[str,
 
 
 def hidden_hinge(rng: np.random.Generator, stage: Stage, strength: float) -> dict[str, object]:
-    """Draw a pin through the table; the weaker the effect, the softer its bushing."""
-    point = (rng.uniform(-0.85, 0.85, 2) * stage.half).tolist()
-    return {"hidden_hinge": {NAME: {"point": point, "stiffness": between(300.0, 4e4, strength)}}}
+    """Draw a pin through the table; the stronger the effect, the softer its bushing, and the more it gives.
+
+    A pin that gives nothing is a locked caster that no hand makes slide, and that is of the baseline class. A table
+    with a wheel turns about a pin on the wheel's axle and no other: elsewhere it would stand still.
+    """
+    point = rng.uniform(-0.85, 0.85, 2) * stage.half
+    known: dict[str, dict[str, dict[str, Any]]] = stage.scene["concealed"]  # type: ignore[assignment]
+    if "wheel" in known:
+        wheel = known["wheel"][NAME]
+        axle = np.array([-math.sin(wheel["heading"]), math.cos(wheel["heading"])])
+        point = wheel["position"] + axle * ((point - wheel["position"]) @ axle) + rng.normal(0.0, NEAR_AXLE, 2)
+        point = np.clip(point, -0.9 * stage.half, 0.9 * stage.half)
+    return {"hidden_hinge": {NAME: {"point": point.tolist(), "stiffness": between(3000.0, 300.0, strength)}}}
 
 
 def floor_patch(rng: np.random.Generator, stage: Stage, strength: float) -> dict[str, object]:
@@ -153,12 +166,12 @@ def unseen_body(rng: np.random.Generator, stage: Stage, strength: float) -> dict
 
 
 def external_force(rng: np.random.Generator, stage: Stage, strength: float) -> dict[str, object]:
-    """Draw a steady push, or a periodic one, for part of the time."""
+    """Draw a push that is steady for part of the time, or periodic; one that is always there is a slope."""
     angle, size = rng.uniform(-math.pi, math.pi), between(1.0, 12.0, strength)
     told: dict[str, object] = {"force": [size * math.cos(angle), size * math.sin(angle)]}
     if rng.random() < 0.5:
         told["period"] = float(rng.uniform(1.0, 4.0))
-    if rng.random() < 0.5:
+    if "period" not in told or rng.random() < 0.5:
         told["start"] = _moment(rng, stage, 0.1, 0.4)
         told["end"] = _moment(rng, stage, 0.6, 0.9)
     return {"external_force": {NAME: told}}

@@ -25,6 +25,8 @@ SCRUB_LENGTH = 0.01
 """A tread that rolls while it turns is twisted less, see `bullet_sim.catalogue.CasterSettings` [m]."""
 PART_OF_IT = ("caster_swivel", "ground_friction")
 """Effects that casters have of their own: they are not concealed on top."""
+OF_CASTERS = (*PART_OF_IT, "breakaway_friction", "viscous_drag")
+"""Effects that somebody who sees casters would repair a model with."""
 
 
 def draw_furnished(rng: np.random.Generator) -> Stage:
@@ -49,7 +51,7 @@ def draw_furnished(rng: np.random.Generator) -> Stage:
             why = str(error).splitlines()[-1]
             continue
         if found.status == "done" and found.slipped <= SLIPPED:
-            return Stage(scene, plain.pushes, plain.seed, found.bodies[NAME])
+            return Stage(scene, plain.pushes, plain.seed, found.bodies[NAME], found)
         why = found.status if found.status != "done" else "it slips in the hand"
     raise BringupError(f"furnished: expected one of {TRIES} tables on casters to be pushed, got {why!r} in the last")
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -20,18 +20,22 @@ from scipy.stats import chi2, ncx2
 from pbrl_bag.types import Recording
 from pbrl_bringup.concealed.truth import Truth
 from pbrl_mismatch.data.grip import lay_grips
+from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.diagnose import fit_baselines, track_of
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.fitted import Fitted, Stages, cut_stages, fit_from, judged, scene_of
-from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, beside_motion, gives_way, grip_evidence
-from pbrl_mismatch.search.hypothesis import Hypothesis
+from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way, grip_evidence
+from pbrl_mismatch.search.hypothesis import BaselineOptions, Hypothesis, baselines
+from pbrl_mismatch.search.told_baseline import ToldBaseline
 
 Array = NDArray[np.float64]
 
 STARTS = 6
 JITTER = 0.15
 """Of the starts about the truth, in standard deviations of the prior."""
+HOPELESS = 0.7
+"""Times the detectable strength below which a first glance says no; it lacks some starts of a look."""
 
 
 @dataclass(frozen=True)
@@ -78,60 +82,114 @@ def _height(fitted: Fitted) -> float:
     return float(motion) + fitted.beside
 
 
-def oracle(recording: Recording, truth: Truth, options: DiagnoseOptions | None = None) -> Oracle:
-    """Fit what was concealed, told.
+@dataclass(frozen=True)
+class Laid:
+    """A recording laid out for an oracle.
+
+    Attributes:
+        track: of the body.
+        stages: windows of growing length.
+        grip: what the grippers' poses say, where they say anything.
+        options: of a diagnosis.
+        baseline: a model that counts as no mismatch; None: every kind of body that does.
+    """
+
+    track: Track
+    stages: Stages
+    grip: GripEvidence | None
+    options: DiagnoseOptions
+    baseline: ToldBaseline | None = None
+
+
+def lay_out(recording: Recording, body: str, baseline: ToldBaseline | None = None) -> Laid:
+    """Lay out what an oracle looks at.
 
     Args:
         recording: as a diagnosis gets it.
-        truth: what was concealed; effects that act through the body's motion.
-        options: of a diagnosis.
+        body: whose motion it is about.
+        baseline: a model that counts as no mismatch; None: every kind of body that does.
     """
-    chosen = options or DiagnoseOptions()
-    track = track_of(recording, truth.body)
-    stages = cut_stages(track, chosen)
-    bases = fit_baselines(np.random.default_rng(chosen.seed), track, stages, chosen)
+    options = DiagnoseOptions()
+    track = track_of(recording, body)
     grips = lay_grips(recording, track)
-    grip = None if grips is None else grip_evidence(grips, chosen.delay_spread)
-    bases = [beside_motion(each, grip) for each in bases]
-    true = "wheel" if "wheel_x" in truth.told else "free"
-    fits: list[Fitted] = []
-    for base in bases:
-        if base.hypothesis.variant != true:
-            continue
-        grounds = [base.hypothesis]
-        for name in truth.effects:
-            if name == GRASP_COMPLIANCE:
-                continue
-            scaled = scene_of(track, base.row)
-            grounds = [
-                ground.with_effect(EFFECTS[name], scaled, variant)
-                for ground in grounds
-                for variant in range(len(EFFECTS[name].variants))
-            ]
-        fits += [_fitted(ground, truth.told, base, stages, chosen) for ground in grounds]
-    if GRASP_COMPLIANCE in truth.effects and grip is not None:
-        fits = [gives_way(each, grip) for each in fits]
-    best = max((beside_motion(each, grip) for each in fits), key=lambda each: each.evidence)
-    return Oracle(judged(best, stages, chosen), judged(bases[0], stages, chosen, even=True))
+    grip = None if grips is None else grip_evidence(grips, options.delay_spread)
+    return Laid(track, cut_stages(track, options), grip, options, baseline)
 
 
-def seen(recording: Recording, truth: Truth) -> bool:
-    """Tell whether what was concealed is at least as strong as what a told oracle detects in 95 % of recordings."""
-    return oracle(recording, truth).times_detectable >= 1.0
+def oracle(laid: Laid, truth: Truth) -> Oracle:
+    """Fit what was concealed, told, and every kind of baseline, not told.
+
+    Args:
+        laid: the recording.
+        truth: what was concealed; effects that act through the body's motion.
+    """
+    rng = np.random.default_rng(laid.options.seed)
+    bases = fit_baselines(rng, laid.track, laid.stages, laid.options, laid.baseline)
+    bases = [beside_motion(each, laid.grip) for each in bases]
+    true = [each for each in bases if laid.baseline is not None or each.hypothesis.variant == _kind(truth)]
+    best = max((_told(laid, truth, each, STARTS) for each in true), key=lambda each: each.evidence)
+    return Oracle(judged(best, laid.stages, laid.options), judged(bases[0], laid.stages, laid.options, even=True))
 
 
-def _fitted(
-    hypothesis: Hypothesis, values: Mapping[str, float], base: Fitted, stages: Stages, options: DiagnoseOptions
-) -> Fitted:
+def seen(laid: Laid, truth: Truth) -> Oracle | None:
+    """Return the oracle if what was concealed is at least what it detects in 95 % of recordings, else nothing.
+
+    Most draws that are too weak are so by far. They are told by one climb from the truth with the effects and one
+    without: what keeps the baseline from better optima makes the effects look stronger, never weaker.
+    """
+    if _glance(laid, truth).times_detectable < HOPELESS:
+        return None
+    found = oracle(laid, truth)
+    return found if found.times_detectable >= 1.0 else None
+
+
+def _glance(laid: Laid, truth: Truth) -> Oracle:
+    """Return an oracle that climbs once over the longest windows, from the truth, with the effects and without."""
+    last = replace(laid, stages=Stages(laid.stages.fitted[-1:], laid.stages.splits[-1:]))
+    hasty = laid.options.model_copy(update={"windows": laid.options.windows[-1:], "keep": (1,), "survivors": ()})
+    last = replace(last, options=hasty.model_copy(update={"iterations": laid.options.iterations[-1:]}))
+    if laid.baseline is not None:
+        base = _fitted(laid.baseline.hypothesis, {}, None, last, 1)
+    else:
+        base = _fitted(kind_of_baseline(laid.track, laid.options, _kind(truth)), truth.told, None, last, 1)
+    return Oracle(_told(last, truth, base, 1), beside_motion(base, laid.grip))
+
+
+def _kind(truth: Truth) -> str:
+    return "wheel" if "wheel_x" in truth.told else "free"
+
+
+def kind_of_baseline(track: Track, options: DiagnoseOptions, kind: str) -> Hypothesis:
+    """Return one kind of baseline as a diagnosis believes it before it has looked."""
+    lower, upper = track.outline.min(axis=0), track.outline.max(axis=0)
+    believed = BaselineOptions(track.nominal_mass, options.mass_spread, options.inertia_spread, options.delay_spread)
+    return baselines(believed, (kind,), 0.5 * (lower + upper), 0.5 * (upper - lower), None)[0]
+
+
+def _told(laid: Laid, truth: Truth, base: Fitted, starts: int) -> Fitted:
+    """Return the likeliest fit of a baseline with everything that was concealed, over its sub-models."""
+    scaled = scene_of(laid.track, base.row)
+    grounds = [base.hypothesis]
+    for name in truth.effects:
+        if name != GRASP_COMPLIANCE:
+            variants = range(len(EFFECTS[name].variants))
+            grounds = [each.with_effect(EFFECTS[name], scaled, variant) for each in grounds for variant in variants]
+    fits = [_fitted(each, truth.told, base, laid, starts) for each in grounds]
+    if GRASP_COMPLIANCE in truth.effects and laid.grip is not None:
+        fits = [gives_way(each, laid.grip) for each in fits]
+    return max((beside_motion(each, laid.grip) for each in fits), key=lambda each: each.evidence)
+
+
+def _fitted(hypothesis: Hypothesis, values: Mapping[str, float], base: Fitted | None, laid: Laid, count: int) -> Fitted:
     """Climb from the truth, and from beside it; what is not told starts where the baseline is, or at its prior."""
     centre = hypothesis.mean.copy()
     for k, parameter in enumerate(hypothesis.parameters):
         told = values.get(parameter.column)
         if told is not None:
             centre[k] = math.log(max(told, 1e-6)) if parameter.positive else told
-        elif parameter.column in base.hypothesis.columns:
+        elif base is not None and parameter.column in base.hypothesis.columns:
             centre[k] = base.peak.coordinates[0, base.hypothesis.columns.index(parameter.column)]
-    rng = np.random.default_rng(options.seed)
-    starts = centre + JITTER * hypothesis.spread * rng.standard_normal((STARTS, len(centre)))
+    rng = np.random.default_rng(laid.options.seed)
+    starts = centre + JITTER * hypothesis.spread * rng.standard_normal((count, len(centre)))
     starts[0] = centre
-    return fit_from(hypothesis, stages, starts, options)
+    return fit_from(hypothesis, laid.stages, starts, laid.options)

@@ -1,53 +1,83 @@
 """A trial in three pieces, each of which goes on where it was stopped: simulate, diagnose, score.
 
 The truth stays in memory: a trial whose bag exists is simulated again, and has to have the seal that was told. The
-diagnosis and the rivals are processes of their own, which are given the bag and nothing else.
+diagnosis and the rivals are another process, which is given the bag and nothing else.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import os
-import resource
-import subprocess
-import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Mapping
 from dataclasses import asdict
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from pbrl_bag import read_recording, write_recording
-from pbrl_bringup.concealed.oracle import oracle
+from pbrl_bag import write_recording
+from pbrl_bag.types import Recording
+from pbrl_bringup.concealed.diagnoser import CLAIMS, REPORT
+from pbrl_bringup.concealed.draws import DRAWS
+from pbrl_bringup.concealed.furnished import OF_CASTERS
 from pbrl_bringup.concealed.scoring import Comparison, Oracle, Score, failed_score, read_score, score
-from pbrl_bringup.concealed.sets import MASS_OFF, Trial, make_trial
+from pbrl_bringup.concealed.sealed import SealedDiagnoser
+from pbrl_bringup.concealed.sets import MadeTrial, Trial, make_trial
 from pbrl_bringup.concealed.stage import NAME
-from pbrl_bringup.concealed.truth import Truth
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.files import write_json, write_text
 from pbrl_bringup.rivals.samples import regimes_of, take_samples
 from pbrl_bringup.terminal import say
 from pbrl_mismatch.diagnose import track_of
-from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_model.errors import ModelError
+from pbrl_mismatch.search.told_baseline import ToldBaseline, baseline_from_model
 
-PATIENCE = 1800.0
-"""For one diagnosis [s]."""
-SEAL, BAG, BARE, FOUND, SPENT, FAILED, CLAIMS, SCORE = (
+SEAL, BAG, BARE, FOUND, SPENT, FAILED, SCORE, UNMADE = (
     "seal.txt",
     "bag",
     "bare",
     "found",
     "spent.json",
     "failed.txt",
-    "rivals.json",
     "score.json",
+    "unmade.txt",
 )
 """What is kept of a trial in its folder."""
 
 
-def simulate(trial: Trial, folder: Path) -> Truth | str:
+@cache
+def diagnoser() -> SealedDiagnoser:
+    """Return this process's partner, which diagnoses for it."""
+    return SealedDiagnoser()
+
+
+def run_trial(trial: Trial, folder: Path, until: float = math.inf) -> Score | str | None:
+    """Make, diagnose and score a trial.
+
+    Args:
+        trial: what to make.
+        folder: of the trial.
+        until: wall-clock time [s since the epoch] after which nothing new is begun.
+
+    Returns:
+        Its score; or in a line why no seed makes it; or nothing, because it was too late to begin.
+
+    Raises:
+        BringupError: the folder's bag was sealed with another truth: it was made by other code.
+    """
+    if time.time() > until:
+        return None
+    made = simulate(trial, folder)
+    if isinstance(made, str):
+        write_text(folder / UNMADE, f"{made}\n")
+        return made
+    say(f"{trial.name}: SHA-256 of the truth {(folder / SEAL).read_text().strip()}, in {folder.name}")
+    models = {} if made.model is None else {"models": [str(made.model)]}
+    diagnose({**trial.options, **models}, folder)
+    return judge(trial, made, folder)
+
+
+def simulate(trial: Trial, folder: Path) -> MadeTrial | str:
     """Make a trial's bag and its seal.
 
     Args:
@@ -55,13 +85,14 @@ def simulate(trial: Trial, folder: Path) -> Truth | str:
         folder: of the trial.
 
     Returns:
-        The truth, for the memory of whoever scores; or in a line why no seed makes this trial.
+        The trial with its truth, for the memory of whoever scores; or in a line why no seed makes it.
 
     Raises:
         BringupError: the folder's bag was sealed with another truth: it was made by other code.
     """
+    folder.mkdir(parents=True, exist_ok=True)
     try:
-        made = make_trial(trial)
+        made = make_trial(trial, partial(learn, folder=folder))
     except BringupError as error:
         return str(error)
     seal = made.truth.seal()
@@ -71,99 +102,90 @@ def simulate(trial: Trial, folder: Path) -> Truth | str:
             f"{kept}: expected the seal {seal[:12]}..., got {kept.read_text()[:12]}...: other code made the bag; "
             "remove the folder"
         )
-    folder.mkdir(parents=True, exist_ok=True)
-    for recording, place in ((made.recording, folder), (made.bare, folder / BARE)):
-        if recording is not None and not (place / BAG).exists():
-            place.mkdir(exist_ok=True)
-            write_recording(recording, place / BAG)
+    if not (folder / BAG).exists():
+        write_recording(made.recording, folder / BAG)
     write_text(kept, f"{seal}\n")
-    return made.truth
+    return made
 
 
-def diagnose(options: Sequence[str], folder: Path) -> None:
-    """Have a bag diagnosed, and looked at by the rivals, each in a process that is given the bag alone.
+def learn(recording: Recording, seed: int, folder: Path) -> tuple[Path, ToldBaseline]:
+    """Have a table diagnosed with nothing concealed, and return its repaired model and the file of that.
 
-    Where there is a recording of the bare table, that is diagnosed first, and its repaired model is the baseline. A
-    diagnosis that ends with an error leaves its last line in the folder.
+    Anybody can see that it stands on casters: nothing else is looked for.
 
     Args:
-        options: of the command `diagnose`.
+        recording: of the table.
+        seed: of the case.
         folder: of the trial.
+
+    Raises:
+        BringupError: the diagnosis ends with an error.
     """
-    if (folder / BARE).exists():
-        _diagnose(options, folder / BARE)
-        options = [*options, "--baseline", str(repaired_model(folder))]
-    _diagnose(options, folder)
-    if not (folder / CLAIMS).exists():
-        spread = [options[options.index("--mass-spread") + 1]] if "--mass-spread" in options else []
-        _, why = _run(["-m", "pbrl_bringup.rivals.run", str(folder / BAG), str(folder / CLAIMS), *spread])
-        if why:
-            say(f"{folder.name}: the rivals end with {why}")
-            write_json(folder / CLAIMS, [])
+    place, known = folder / f"{BARE}-{seed}", DiagnoseOptions()
+    place.mkdir(exist_ok=True)
+    if not (place / BAG).exists():
+        write_recording(recording, place / BAG)
+    diagnose({"without": [name for name in DRAWS if name not in OF_CASTERS]}, place, rivals=False)
+    if (place / FAILED).exists():
+        raise BringupError(f"{place}: expected a model of the table, got {(place / FAILED).read_text().strip()}")
+    path = place / FOUND / f"model_{NAME}.json"
+    told = baseline_from_model(path, inertia_spread=known.inertia_spread, delay_spread=known.delay_spread)
+    return path, told
 
 
-def repaired_model(folder: Path) -> Path:
-    """Return the file of a bare table's model, as its diagnosis writes it."""
-    return folder / BARE / FOUND / f"model_{NAME}.json"
+def diagnose(options: Mapping[str, Any], folder: Path, *, rivals: bool = True) -> None:
+    """Have a folder's bag diagnosed by a process that is given the bag alone, unless that was done.
 
+    A diagnosis that ends with an error leaves its last line in the folder.
 
-def _diagnose(options: Sequence[str], folder: Path) -> None:
-    """Diagnose a folder's bag, unless that was done."""
-    if (folder / FOUND / "report.json").exists() or (folder / FAILED).exists():
+    Args:
+        options: settings of the diagnosis, by name.
+        folder: with the bag.
+        rivals: whether the rivals are asked as well.
+    """
+    if (folder / FOUND / REPORT).exists() or (folder / FAILED).exists():
         return
-    command = ["-m", "pbrl_bringup", "diagnose", str(folder / BAG), "--out", str(folder / FOUND), "--workers", "1"]
-    spent, why = _run([*command, *options])
+    spent, why = diagnoser().ask(folder / BAG, folder / FOUND, options, rivals=rivals)
     write_json(folder / SPENT, {"seconds": spent})
     if why:
         write_text(folder / FAILED, f"{why}\n")
 
 
-def _run(arguments: Sequence[str]) -> tuple[float, str]:
-    """Run Python on something; return CPU seconds, and the last line of what went wrong or nothing."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    try:
-        ended = subprocess.run(
-            [sys.executable, *arguments], capture_output=True, text=True, timeout=PATIENCE, env=os.environ, check=False
-        )
-        why = (ended.stderr.strip().splitlines() or ["no word"])[-1] if ended.returncode else ""
-    except subprocess.TimeoutExpired:
-        why = f"no answer in {PATIENCE:.0f} s"
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, why
-
-
-def judge(trial: Trial, truth: Truth, folder: Path, *, ask_oracle: bool = True) -> Score:
+def judge(trial: Trial, made: MadeTrial, folder: Path) -> Score:
     """Score what a trial's diagnosis and rivals said, and keep the score.
 
     Args:
         trial: the trial.
-        truth: what was concealed.
+        made: with the truth, and what a told oracle reaches.
         folder: of the trial.
-        ask_oracle: whether to fit what a told oracle reaches.
     """
-    seal = (folder / SEAL).read_text().strip()
+    seal, truth = (folder / SEAL).read_text().strip(), made.truth
     if (folder / FAILED).exists():
         why = (folder / FAILED).read_text().strip()
         result = failed_score(trial.name, truth, seal, why, trial.set, trial.withheld)
     else:
-        recording = read_recording(folder / BAG)
-        track = track_of(recording, truth.body)
+        track = track_of(made.recording, truth.body)
         samples = take_samples(track)
-        report: dict[str, Any] = json.loads((folder / FOUND / "report.json").read_text())
+        report: dict[str, Any] = json.loads((folder / FOUND / REPORT).read_text())
         result = score(
             trial.name,
             truth,
             report,
             seal,
-            float(json.loads((folder / SPENT).read_text())["seconds"]),
+            _seconds(folder),
             comparison=Comparison(samples, regimes_of(samples), track.outline),
-            oracle=_oracle(trial, truth, folder) if ask_oracle and truth.effects else None,
-            claims=json.loads((folder / CLAIMS).read_text()),
+            oracle=_reached(made),
+            claims=json.loads((folder / FOUND / CLAIMS).read_text()),
             group=trial.set,
             withheld=trial.withheld,
         )
     write_json(folder / SCORE, asdict(result))
     return result
+
+
+def _seconds(folder: Path) -> float:
+    told = json.loads((folder / SPENT).read_text())["seconds"]
+    return math.nan if told is None else float(told)
 
 
 def kept_score(folder: Path) -> Score | None:
@@ -172,15 +194,16 @@ def kept_score(folder: Path) -> Score | None:
     return read_score(json.loads(path.read_text())) if path.exists() else None
 
 
-def _oracle(trial: Trial, truth: Truth, folder: Path) -> Oracle:
-    """Return what a told oracle reaches; nothing where the effect is not one that it can fit, and says so."""
-    told_of: dict[str, Any] = {"mass_spread": MASS_OFF} if trial.set == "rough" else {}
-    if (folder / BARE).exists():
-        told_of["baseline"] = (str(repaired_model(folder)),)
-    try:
-        told = oracle(read_recording(folder / BAG), truth, DiagnoseOptions(**told_of))
-    except (MismatchError, ModelError) as error:
-        say(f"{trial.name}: no oracle: {error}")
-        return Oracle()
-    reached = told.fitted.score
-    return Oracle(math.nan if reached is None else reached.rmse_position, told.gain)
+def kept_reason(folder: Path) -> str | None:
+    """Return why a folder's trial cannot be made, if it cannot."""
+    path = folder / UNMADE
+    return path.read_text().strip() if path.exists() else None
+
+
+def _reached(made: MadeTrial) -> Oracle | None:
+    """Return what a told oracle reaches, if one was asked."""
+    if made.oracle is None:
+        return None
+    reached, told = made.oracle.fitted.score, made.oracle
+    error = math.nan if reached is None else reached.rmse_position
+    return Oracle(error, told.gain, told.times_detectable)

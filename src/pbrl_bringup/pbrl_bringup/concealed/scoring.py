@@ -21,18 +21,23 @@ ALWAYS = 0.9
 """Effects that act for more of the time than this have no time to be found."""
 GRID = 0.01
 """Of the comparison of intervals [s]."""
-DETECTABLE = 6.5
-"""Gain [nat] of a told oracle at which a test at 5 % finds one parameter in 95 %: half a non-centrality of 13."""
 AS_GOOD = 1.1
 """A name predicts as well as the oracle where its error is at most so many times the oracle's."""
 
 
 @dataclass(frozen=True)
 class Oracle:
-    """What a told oracle reaches: held-out position error [m], and its gain over the baseline [nat]."""
+    """What a told oracle reaches.
+
+    Attributes:
+        error: held-out position error [m].
+        gain: log evidence over the baseline's [nat].
+        times: strength over what it detects in 95 % of recordings.
+    """
 
     error: float = math.nan
     gain: float = math.nan
+    times: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,7 @@ class Score:
         floor: noise of a pose in position [m].
         oracle: held-out position error of a told oracle [m], NaN where none was asked.
         oracle_gain: of the oracle over the baseline [nat].
+        times_detectable: strength over what a told oracle detects in 95 % of recordings, NaN where none was asked.
         located: how well it was localised; NaN on clean recordings.
         places: how far off in place [m], by effect that is named right and has one.
         moments: how far off in the moment at which it began [s], likewise.
@@ -107,6 +113,7 @@ class Score:
     floor: float = math.nan
     oracle: float = math.nan
     oracle_gain: float = math.nan
+    times_detectable: float = math.nan
     located: Localised = field(default_factory=lambda: Localised(*(math.nan,) * 4))
     places: dict[str, float] = field(default_factory=dict)
     moments: dict[str, float] = field(default_factory=dict)
@@ -128,14 +135,6 @@ class Score:
     def in_three(self) -> bool:
         """Tell whether what was concealed is among the first three, and a mismatch was seen."""
         return self.mismatch and set(self.effects) <= set(self.ranked[: max(3, len(self.effects))])
-
-    @property
-    def times_detectable(self) -> float:
-        """Return how strong the effects are over what a told oracle detects in 95 %; NaN where none was asked.
-
-        An oracle's gain grows with the square of the strength.
-        """
-        return math.sqrt(max(self.oracle_gain, 0.0) / DETECTABLE) if not math.isnan(self.oracle_gain) else math.nan
 
     @property
     def gain(self) -> float:
@@ -203,6 +202,7 @@ def score(
         floor=_number(errors["noise_floor"]),
         oracle=told.error,
         oracle_gain=told.gain,
+        times_detectable=told.times,
         located=_located(truth, found, comparison),
         places={} if comparison is None else _places(truth, right, comparison),
         moments=_numbers({name: moment_error(name, truth, each) for name, each in right.items()}),

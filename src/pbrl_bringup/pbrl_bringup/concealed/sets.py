@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
 import itertools
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +19,11 @@ from pbrl_bag.types import BodyGeometry, PoseStream, Recording
 from pbrl_bringup.concealed.cases import Case, make
 from pbrl_bringup.concealed.draws import DRAWS
 from pbrl_bringup.concealed.furnished import PART_OF_IT, bare_recording, draw_furnished, with_casters
+from pbrl_bringup.concealed.oracle import Oracle
 from pbrl_bringup.concealed.stage import Stage
 from pbrl_bringup.concealed.truth import Truth
 from pbrl_bringup.errors import BringupError
+from pbrl_mismatch.search.told_baseline import ToldBaseline
 
 Array = NDArray[np.float64]
 
@@ -63,19 +68,28 @@ class Trial:
     Attributes:
         set: its name.
         case: what is concealed; its seed is the first that is tried.
-        options: of the command `diagnose`.
         withheld: effects that the library does without.
     """
 
     set: str
     case: Case
-    options: tuple[str, ...] = ()
     withheld: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
-        """Return what to call it, a path below the bench's folder."""
+        """Return what to call it."""
         return f"{self.set}/{self.case.name}"
+
+    @property
+    def folder(self) -> str:
+        """Return the name of its folder, which says nothing of what is concealed: a diagnosis sees the path."""
+        return hashlib.sha256(self.name.encode()).hexdigest()[:12]
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Return the settings of its diagnosis, by name in `DiagnoseOptions`."""
+        told: dict[str, Any] = {"mass_spread": MASS_OFF} if self.set == "rough" else {}
+        return told | ({"without": list(self.withheld)} if self.withheld else {})
 
 
 def check_sets(names: Sequence[str]) -> tuple[str, ...]:
@@ -128,13 +142,23 @@ def _of_set(name: str, seed: int, quick: bool) -> list[Trial]:
         pairs = draw_pairs(np.random.default_rng(first), 1 if quick else PAIRS)
         return [Trial(name, Case(pair, first + number)) for number, pair in enumerate(pairs)]
     if name == "withheld":
-        return [
-            Trial(name, Case((each,), first + number), ("--without", each), (each,))
-            for each in effects
-            for number in range(count)
-        ]
-    options = ("--mass-spread", f"{MASS_OFF:g}") if name == "rough" else ()
-    return [Trial(name, Case((each,), first + number), options) for each in effects for number in range(count)]
+        return [Trial(name, Case((each,), first + number), (each,)) for each in effects for number in range(count)]
+    return [Trial(name, Case((each,), first + number)) for each in effects for number in range(count)]
+
+
+def evenly(trials: Sequence[Trial]) -> list[Trial]:
+    """Return trials in an order of which every beginning has about the same share of each set and each effect."""
+    counts: Counter[tuple[str, tuple[str, ...]]] = Counter()
+    turn: dict[Trial, int] = {}
+    for trial in trials:
+        key = (trial.set, trial.case.effects)
+        turn[trial] = counts[key]
+        counts[key] += 1
+    by_set: dict[str, list[Trial]] = {}
+    for trial in sorted(trials, key=turn.__getitem__):
+        by_set.setdefault(trial.set, []).append(trial)
+    places = {trial: (k + 0.5) / len(each) for each in by_set.values() for k, trial in enumerate(each)}
+    return sorted(trials, key=places.__getitem__)
 
 
 def draw_pairs(rng: np.random.Generator, count: int) -> list[tuple[str, str]]:
@@ -158,15 +182,26 @@ def go_together(one: str, other: str) -> bool:
 
 @dataclass(frozen=True)
 class MadeTrial:
-    """What a trial's simulation gave: the recording, the truth, and of a furnished table a recording without it."""
+    """What a trial's simulation gave: recording, truth, oracle, and the file of a model that was learned before."""
 
     recording: Recording
     truth: Truth
-    bare: Recording | None = None
+    oracle: Oracle | None = None
+    model: Path | None = None
 
 
-def make_trial(trial: Trial) -> MadeTrial:
+LearnModel = Callable[[Recording, int], tuple[Path, ToldBaseline]]
+"""From the recording of a table with nothing concealed, and its case's seed, to a repaired model and its file."""
+
+
+def make_trial(trial: Trial, learn: LearnModel) -> MadeTrial:
     """Simulate a trial; where a draw does not come to act, another seed is tried.
+
+    An oracle is asked of the recording as it was made, also where a diagnosis is told less.
+
+    Args:
+        trial: what to make.
+        learn: asked where a table on casters is to be known before anything is concealed.
 
     Raises:
         BringupError: none of them can be made.
@@ -175,26 +210,30 @@ def make_trial(trial: Trial) -> MadeTrial:
     for number in range(SPARES):
         case = replace(trial.case, seed=trial.case.seed + SPARE_STEP * number)
         try:
-            return _furnished(case) if trial.set == "furnished" else _plain(case, trial.set == "rough")
+            return _furnished(case, learn) if trial.set == "furnished" else _plain(case, trial.set == "rough")
         except BringupError as error:
             why = str(error)
     raise BringupError(f"{trial.name}: expected one of {SPARES} seeds to make it, got {why!r} in the last")
 
 
 def _plain(case: Case, rough: bool) -> MadeTrial:
-    recording, truth = make(case)
-    return MadeTrial(told_roughly(recording, np.random.default_rng([case.seed, 1])) if rough else recording, truth)
+    made = make(case)
+    told = told_roughly(made.recording, np.random.default_rng([case.seed, 1])) if rough else made.recording
+    return MadeTrial(told, made.truth, made.oracle)
 
 
-def _furnished(case: Case) -> MadeTrial:
+def _furnished(case: Case, learn: LearnModel) -> MadeTrial:
     stages: list[Stage] = []
+    files: list[Path] = []
 
-    def draw(rng: np.random.Generator) -> Stage:
-        stages.append(draw_furnished(rng))
-        return stages[-1]
+    def learned(stage: Stage) -> ToldBaseline:
+        stages.append(stage)
+        path, baseline = learn(bare_recording(stage), case.seed)
+        files.append(path)
+        return baseline
 
-    recording, truth = make(case, draw)
-    return MadeTrial(with_casters(recording, stages[-1]), truth, bare_recording(stages[-1]))
+    made = make(case, draw_furnished, learned)
+    return MadeTrial(with_casters(made.recording, stages[-1]), made.truth, made.oracle, files[-1])
 
 
 def told_roughly(recording: Recording, rng: np.random.Generator) -> Recording:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bullet_sim.errors import SimError
+from bullet_sim.hand import HandSpec
 from bullet_sim.hand_push import push_by_hand
-from bullet_sim.hand_recording import BodyTrack, HandPath, HandPush, HandRecording
+from bullet_sim.hand_recording import BodyTrack, HandPath, HandPush, HandRecording, Limits
 from bullet_sim.scene import Scene, WristSettings
 from pbrl_bringup.errors import BringupError
 
@@ -33,6 +34,12 @@ FASTEST, SPINNING, SLIPPED = 0.4, 0.6, 0.008
 """Of a push that counts: speed of the table [m/s], its turning [rad/s], way of its edge in the hand [m]."""
 RANGE = 0.95
 """Of a wrist sensor that may be used: at its end it shows less than there is."""
+PINNED = "hidden_hinge"
+"""The effect against which a hand cannot win."""
+SOFT = HandSpec(force_limit=34.0, torque_limit=2.5)
+"""The hand that holds a pinned table: what it cannot move it follows, and the wrist stays within its range."""
+STRAIN, TURNING, LEVER = 0.6, 0.4, 0.3
+"""Of a push about a pin: share of the sway that pulls at the pin, turning at most [rad/s], least lever [m]."""
 TRIES = 24
 """Pushes that are drawn before a table counts as one that cannot be pushed."""
 
@@ -46,12 +53,14 @@ class Stage:
         pushes: what the hand does.
         seed: of the simulation.
         track: where the table goes if nothing is concealed.
+        bare: the recording of that, where it was kept.
     """
 
     scene: dict[str, object]
     pushes: tuple[HandPush, ...]
     seed: int
     track: BodyTrack
+    bare: HandRecording | None = None
 
     @property
     def half(self) -> Array:
@@ -97,14 +106,21 @@ def draw_stage(rng: np.random.Generator) -> Stage:
         pushes = tuple(draw_push(rng, half, gentle=0.85**number) for _ in range(PUSHES))
         seed = int(rng.integers(2**31))
         try:
-            found = push_by_hand(Scene.model_validate(scene), pushes, seed=seed)
+            found = push_by_hand(Scene.model_validate(scene), pushes, seed=seed, limits=careful())
         except SimError as error:  # a table without friction may have rolled on until the hand came back
             why = str(error)
             continue
         why = found.status if found.status != "done" else violence(found)
         if not why:
-            return Stage(scene, pushes, seed, found.bodies[NAME])
+            return Stage(scene, pushes, seed, found.bodies[NAME], found)
     raise BringupError(f"concealed: expected one of {TRIES} drawn pushes to succeed, got {why!r} in the last")
+
+
+def careful() -> Limits:
+    """Return the limits of a push that counts, at which a draw is given up."""
+    sensor = WristSettings()
+    force, torque = (RANGE * np.array(each) for each in (sensor.force_range, sensor.torque_range))
+    return Limits(FASTEST, SPINNING, SLIPPED, force, torque)
 
 
 def violence(found: HandRecording) -> str:
@@ -120,16 +136,45 @@ def violence(found: HandRecording) -> str:
 
 def saturated(found: HandRecording) -> bool:
     """Tell whether a wrist sensor came near the end of its range, where a force or a torque is more than it shows."""
-    sensor = WristSettings()
+    limits = careful()
     force, torque = np.abs(found.wrench.force), np.abs(found.wrench.torque)
-    return bool(
-        np.any(force > RANGE * np.array(sensor.force_range)) or np.any(torque > RANGE * np.array(sensor.torque_range))
-    )
+    return bool(np.any(force > limits.force) or np.any(torque > limits.torque))
 
 
 def play(stage: Stage, concealed: dict[str, object]) -> HandRecording:
-    """Push the table of a stage with something concealed."""
-    return push_by_hand(stage.with_concealed(concealed), stage.pushes, seed=stage.seed)
+    """Push the table of a stage with something concealed; a pinned one is pushed softly."""
+    if not concealed and stage.bare is not None:
+        return stage.bare
+    scene, pushes, hand = stage.with_concealed(concealed), stage.pushes, None
+    if PINNED in concealed:
+        pin = np.array(scene.concealed.hidden_hinge[NAME].point)
+        pushes, hand = tuple(about_pin(each, stage.half, pin) for each in pushes), SOFT
+    return push_by_hand(scene, pushes, seed=stage.seed, hand=hand)
+
+
+def about_pin(push: HandPush, half: Array, pin: Array) -> HandPush:
+    """Return a push that goes the one way a pin leaves, and pulls at it a little.
+
+    A hand that feels that it cannot go straight on goes about what holds it. Its path is in its own axes, and it holds
+    the table: the way about the pin is always the same there.
+
+    Args:
+        push: as for a free table, along the approach and to its left.
+        half: (2,) half the table's extent [m].
+        pin: (2,) its place, body's frame [m].
+    """
+    contact = np.array(push.contact)
+    side = int(np.argmax(np.abs(contact) / half))
+    inwards = np.zeros(2)
+    inwards[side] = -np.sign(contact[side])
+    arm = contact + 0.5 * SOFT.depth * inwards - pin
+    left = np.array([-inwards[1], inwards[0]])
+    way = np.array([inwards @ (-arm[1], arm[0]), left @ (-arm[1], arm[0])])
+    away = np.array([inwards @ arm, left @ arm]) / max(float(np.hypot(*arm)), 1e-6)
+    speed, sway, _ = push.path.twist.T
+    turn = np.clip(speed / max(float(np.hypot(*arm)), LEVER), -TURNING, TURNING)
+    along = turn[:, None] * way + STRAIN * sway[:, None] * away
+    return HandPush(push.body, push.contact, HandPath(push.path.time, np.column_stack([along, turn]), "hand"))
 
 
 def _scene(rng: np.random.Generator) -> dict[str, object]:

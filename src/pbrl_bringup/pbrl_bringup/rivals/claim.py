@@ -6,24 +6,20 @@ the wrench that the baseline lacks. It may learn from all but the blocks that ar
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_bag.types import Recording
-from pbrl_bringup.errors import BringupError
 from pbrl_bringup.rivals.samples import Interval, Regimes, Samples, regimes_of, take_samples
 from pbrl_mismatch.data.cuts import Cuts, cut_windows, held_out_blocks, inside, touching
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
 from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.data.track import Track
-from pbrl_mismatch.diagnose import fit_baselines, track_of
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.fitted import Fitted, cut_stages
+from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.heldout import errors, settle
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import NUISANCES, Objective
@@ -52,7 +48,6 @@ class Given:
         samples: n of them.
         regimes: that the samples fall into.
         open: (n,) samples that may be learned from: moving, in no held-out block.
-        seconds: of CPU that all this took.
     """
 
     track: Track
@@ -64,7 +59,6 @@ class Given:
     samples: Samples
     regimes: Regimes
     open: NDArray[np.bool_]
-    seconds: float
 
     @property
     def row(self) -> Array:
@@ -92,7 +86,7 @@ class Claim:
         when: intervals in which the baseline is wrong [s].
         regimes: names of the regimes in which it is wrong, by axis; axes that are missing follow from `when`.
         heldout: position error of its prediction of what was held out [m]; NaN where nothing could be.
-        seconds: of CPU, the baseline's fit included.
+        seconds: of CPU, beside the baseline's fit, which all share.
         notes: what must not be read into it.
     """
 
@@ -107,39 +101,31 @@ class Claim:
 Rival = Callable[[Given], Claim]
 
 
-def give(recording: Recording, options: DiagnoseOptions | None = None) -> Given:
-    """Lay out a recording of one held object and fit the baselines.
+def give(fitted: Fitted, options: DiagnoseOptions) -> Given:
+    """Lay out what rivals work on: the track and the baseline of a diagnosis, which are theirs as well.
 
-    Raises:
-        BringupError: not exactly one object was held.
-        ModelError: it never moved, or a stream is broken.
-        MismatchError: nothing was felt.
+    Args:
+        fitted: the best of the baselines, as a diagnosis finds it.
+        options: of that diagnosis.
     """
-    started = time.process_time()
-    chosen = options or DiagnoseOptions()
-    held = sorted({grasp.object for grasp in recording.grasps})
-    if len(held) != 1:
-        raise BringupError(f"rivals: expected one object that was held, got {', '.join(held) or 'none'}")
-    track = track_of(recording, held[0])
-    best = fit_baselines(np.random.default_rng(chosen.seed), track, cut_stages(track, chosen), chosen)[0]
-    kept, heldout = _split(track, chosen)
-    coordinates = _refitted(best, kept, chosen)
+    track = fitted.peak.objective.cuts.track
+    kept, heldout = _split(track, options)
+    coordinates = _refitted(fitted, kept, options)
     samples = take_samples(track)
     free = samples.moving.copy()
     if heldout is not None:
-        free &= ~samples.inside(held_out_blocks(track, chosen.block, chosen.every))
-    residual = residual_wrench(track, best.hypothesis.rows(coordinates)[0])
+        free &= ~samples.inside(held_out_blocks(track, options.block, options.every))
+    residual = residual_wrench(track, fitted.hypothesis.rows(coordinates)[0])
     return Given(
         track,
-        best.hypothesis,
+        fitted.hypothesis,
         coordinates,
-        chosen.sensor_floor,
+        options.sensor_floor,
         heldout,
         residual,
         samples,
         regimes_of(samples),
         free,
-        time.process_time() - started,
     )
 
 
