@@ -30,10 +30,11 @@ class DiagnoseOptions(BaseModel):
         windows: lengths of the windows of the search, growing [s].
         block: length of what is held out at a time [s].
         every: one block of so many is held out.
-        draws: of an effect's prior for each three of its parameters, compared with the residual wrench; a quarter of
-            them where more moves than the body.
-        candidates: how many of those are held against the shortest windows.
-        keep: how many of those are climbed from, for each length of window.
+        draws: of an effect's prior for each three of its parameters that are not solved for, compared with what is
+            lacking along the recorded path; a quarter of them where more moves than the body.
+        candidates: how many of those are climbed from along the path.
+        shortlist: effects at most that go on from the path to simulated windows, by evidence.
+        keep: from how many points an effect is climbed over windows of each length.
         iterations: of a climb, for each length of window.
         survivors: effects at most that go on to each next length of window, by evidence.
         sensor_floor: size of the wrist sensor's own error in motion [N].

@@ -110,7 +110,7 @@ def climb(
         rough: keep the slopes in the nuisances from the start to the end; else they are taken anew for the evidence.
         spread: (P, W, R, NUISANCES) slopes in the nuisances to begin with; None: taken at the starts.
     """
-    u = coordinates.copy()
+    u = objective.hypothesis.believable(coordinates)
     z = objective.at_rest(len(u)) if nuisance is None else nuisance.copy()
     damping = np.full(len(u), FIRST_DAMPING)
     prior_precision = objective.hypothesis.spread**-2.0
@@ -135,6 +135,7 @@ def climb(
             damped = curvature[open_rows] + damping[open_rows, None, None] * _diagonal(curvature[open_rows])
             step = np.linalg.solve(damped, pull[open_rows, :, None])[..., 0]
             step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
+            step = objective.hypothesis.believable(u[open_rows] + step) - u[open_rows]
             shift = reduced.shift[open_rows] - (reduced.gain[open_rows] @ step[:, None, :, None])[..., 0]
             trial_u, trial_z = u[open_rows] + step, z[open_rows] + shift
             trial_z, _, misfit = settled(objective, trial_u, trial_z, spread[open_rows])

@@ -24,8 +24,6 @@ from pbrl_model.fitting.guesses import axle, circle, pivot
 
 Array = NDArray[np.float64]
 
-ENOUGH = 40
-"""Of more windows than this, only every other is looked at over the shortest."""
 BASELINE_STARTS, BASELINE_STEPS, KEPT_OF_BASELINE = 20, 6, 4
 """A baseline is climbed along the path from so many starts, in so many steps; so many go on to windows."""
 WHOLE = 4
@@ -128,11 +126,7 @@ def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:
         ModelError: no window has enough poses.
     """
     cut = [cut_windows(track, length) for length in options.windows]
-    # A first look does not need every window: what is wrong with a start is wrong in most of them.
-    fitted = tuple(
-        cuts.take(np.arange(0, len(cuts), 2)) if len(cuts) > ENOUGH and stage == 0 < len(cut) - 1 else cuts
-        for stage, cuts in enumerate(cut)
-    )
+    fitted = tuple(cut)
     blocks = held_out_blocks(track, options.block, options.every)
     longest, splits = cut_windows(track, options.block), []
     for cuts in cut:

@@ -11,9 +11,14 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.effects.effect import Effect, Parameter, Scene
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
+from pbrl_model.parameters import KERNEL_COLUMNS
 
 Array = NDArray[np.float64]
 
+FURTHEST = 3.5
+"""An effect's parameter is no further from its prior's centre than so many of its standard deviations."""
+OF_THE_BODY = frozenset({*KERNEL_COLUMNS, "inertia_factor", "delay"})
+"""Columns of a baseline."""
 SHARE = 1e-2
 """Of a prior's spread: friction is solved for only so exactly, and a finite difference must be well above that."""
 SMALL = {"m": 0.005, "s": 0.02, "rad": 0.01}
@@ -66,6 +71,15 @@ class Hypothesis:
             value = rows[:, COLUMN[parameter.column]]
             columns.append(np.log(np.maximum(value, 1e-12)) if parameter.positive else value)
         return np.column_stack(columns)
+
+    def believable(self, coordinates: Array) -> Array:
+        """Return coordinates (P, K) with those of effects brought back to where their priors are.
+
+        Where no law is right, a wrong one would else buy what it explains with a force sensor that is off fivefold. The
+        body's own are left as they are: how far off they have to be is itself a sign of a mismatch.
+        """
+        reach = np.array([math.inf if column in OF_THE_BODY else FURTHEST for column in self.columns])
+        return np.clip(coordinates, self.mean - reach * self.spread, self.mean + reach * self.spread)
 
     def sample_prior(self, rng: np.random.Generator, count: int) -> Array:
         """Draw (count, K) coordinates."""

@@ -158,6 +158,8 @@ def search_library(
             Fitted(job[0], alone(peak), None, None, None if shorter is None else alone(shorter))
             for job, peak, shorter in zip(running, peaks, before, strict=True)
         ]
+        if len(stages.fitted) < len(options.windows):
+            return done  # What is weighed are shorter windows than the path's.
         along = {each.hypothesis.variant: each.coordinates[0] for each in begun}
         starts = [np.array([along[each.hypothesis.variant], each.peak.coordinates[0]]) for each in done]
         return list(pool.map(partial(trace, longest, options), done, starts))

@@ -62,7 +62,7 @@ def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations:
         starts: (P, K).
         iterations: steps at most.
     """
-    u, count, free = starts.copy(), len(starts), starts.shape[1]
+    u, count, free = hypothesis.believable(starts), len(starts), starts.shape[1]
     steps, spread, mean = step_sizes(hypothesis), hypothesis.spread, hypothesis.mean
     damping, most = np.full(count, FIRST_DAMPING), 3.0 * spread
     moves = np.concatenate([np.zeros((1, free)), np.diag(steps)])
@@ -92,6 +92,7 @@ def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations:
         diagonal = curvature * np.eye(free)
         step = np.linalg.solve(curvature + damping[:, None, None] * diagonal, pull[..., None])[..., 0]
         step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
+        step = hypothesis.believable(u + step) - u
         there_residual, there_slope = linear(u + step)
         there = np.sum(there_residual**2, axis=2)
         gained = 0.5 * (cost - (-2.0 * likelihood(along, there) + prior(u + step)))
