@@ -17,7 +17,7 @@ from pbrl_mismatch.kernels.path_kernel import REACTION
 from pbrl_mismatch.kernels.sense_kernel import load_now, to_truth
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import scene_of
-from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
+from pbrl_mismatch.search.hypothesis import FURTHEST, BaselineOptions, baselines
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.along import as_seen_path, lay_along
 from pbrl_mismatch.search.path.climb import climb_along
@@ -111,3 +111,15 @@ def test_what_was_not_seen_says_nothing(track: Any, free: Any) -> None:
     rows = free.rows(free.mean[None])
     found = other.residual(rows)[0]
     assert not found[3].any() and np.array_equal(np.delete(found, 3, 0), np.delete(one.residual(rows)[0], 3, 0))
+
+
+def test_no_climb_leaves_what_is_believed_of_an_effect_and_the_body_is_free_to(track: Any, free: Any) -> None:
+    sensor = free.with_effect(EFFECTS["wrench_frame"], scene_of(track, free.rows(free.mean[None])[0]), 1)
+    scale, mass = sensor.columns.index("force_scale"), sensor.columns.index("mass")
+    far = sensor.mean.copy()
+    far[[scale, mass]] += 8.0 * sensor.spread[[scale, mass]]
+    kept = sensor.believable(far[None])[0]
+    assert kept[scale] == pytest.approx(FURTHEST * sensor.spread[scale]) and kept[mass] == far[mass]
+    along = lay_along(cut_windows(track, 1.0), track.seen, MASS, FLOOR, 4)
+    found = climb_along(along, sensor, far[None], 6).coordinates[0]
+    assert abs(found[scale]) <= FURTHEST * sensor.spread[scale] + 1e-12
