@@ -69,7 +69,7 @@ class DiagnoseOptions(BaseModel):
     sensor_floor: Positive = 0.15
     mass_spread: Positive = 0.1
     inertia_spread: Positive = 0.1
-    delay_spread: Positive = 0.005
+    delay_spread: Positive = 0.02
     none_odds: Positive = 1.0
     most_together: Annotated[int, Field(ge=1, le=3)] = 2
     workers: Annotated[int, Field(ge=1, le=256)] = 2

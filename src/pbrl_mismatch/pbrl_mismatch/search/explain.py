@@ -29,6 +29,8 @@ REACHED = 1.12
 """A hypothesis that needs less than this scale of the noise predicts windows of its length."""
 POLISHED, LONGER = 5, 2
 """So many of the likeliest effects are climbed on, for so many times the usual steps."""
+LEADS = 3
+"""So many of the likeliest effects lead a baseline to where they have the body's own parameters."""
 NEAR_THE_FLOOR = 1.1
 """A hypothesis that needs less than this scale of the noise leaves nothing worth another effect."""
 WORTH_A_KIND = 3.0
@@ -78,11 +80,13 @@ def explain(
     bases = [trace(longest, options, each, each.peak.coordinates) for each in bases]
     bases = sorted(bases, key=lambda each: -each.evidence)
     tried = _tried(seeds[0], track, _grounds(bases), stages, grip, options)
+    bases = _reached(bases, tried, stages, options)
     singles = weigh(bases, tried, options)
     if min(each.noise_scale for each in tried) > REACHED and len(stages.fitted) > 1:
         stages, bases = stages.without_longest(), [each.over_shorter() for each in bases]
         bases = sorted(bases, key=lambda each: -each.evidence)
         tried = [beside_motion(each.over_shorter(), grip) for each in tried]
+        bases = _reached(bases, tried, stages, options)
     tried = [beside_motion(each, grip) for each in _polished(weigh(bases, tried, options), tried, stages, options)]
     weighed = weigh(bases, tried, options)
     odds = min(_log_odds(singles), _log_odds(weighed))
@@ -96,6 +100,25 @@ def explain(
         tried += _tried(seeds[depth], track, deepest, stages, grip, fewer)
         weighed = weigh(bases, tried, options)
     return Explained(weighed, bases, stages, odds)
+
+
+def _reached(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: DiagnoseOptions) -> list[Fitted]:
+    """Return the baselines climbed on from where likely effects have mass and wheel, best first.
+
+    Where bodies stick there are many tops. An effect that does nothing but lead to a better one explains nothing.
+    """
+    likely = sorted((each for each in tried if GRASP_COMPLIANCE not in each.hypothesis.effects), key=_lowest)[:LEADS]
+    climbed = []
+    for base in bases:
+        found = base
+        for each in likely:
+            found = _climbed_on(found, each, stages, options)
+        climbed.append(found)
+    return sorted(climbed, key=_lowest)
+
+
+def _lowest(fitted: Fitted) -> float:
+    return -fitted.evidence
 
 
 def _polished(
