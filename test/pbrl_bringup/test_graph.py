@@ -90,7 +90,7 @@ def test_an_unknown_graph_names_the_nearest() -> None:
 
 
 def test_an_unknown_executable_is_an_error() -> None:
-    with pytest.raises(BringupError, match="krang_sim has no executable 'sim'; it has sim_node"):
+    with pytest.raises(BringupError, match="krang_sim has no executable 'sim'; it has hand_node, sim_node"):
         node_command("sim", Node(package="krang_sim", executable="sim"))
     with pytest.raises(BringupError, match="'krang' is not in the ament index"):
         node_command("sim", Node(package="krang", executable="sim_node"))

@@ -120,7 +120,7 @@ def test_the_next_experiment_is_run_and_the_odds_change(user: User) -> None:
     user.until(user.diagnosed)
     before = user.diagnosed()[-1]
     odds = probabilities(before)
-    assert odds["viscous_drag"] < 0.95 and sum(odds[name] for name in GROUP) > 0.99
+    assert odds["viscous_drag"] < 0.99 and sum(odds[name] for name in GROUP) > 0.99
 
     done = user.call(Trigger, "/run_next_experiment", Trigger.Request())
     assert done.success and '"object": "table"' in done.message and "expected_bits" in done.message
