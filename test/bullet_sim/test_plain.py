@@ -64,6 +64,26 @@ def test_a_wheel_rolls_along_its_heading_and_holds_across_up_to_its_friction(lab
     assert max(np.abs(across)) < 0.01 * max(np.abs(along))
 
 
+@pytest.mark.parametrize("heading", [0.0, 0.4, 1.2])
+def test_a_wheel_that_holds_does_not_creep(lab: Any, heading: float) -> None:
+    wheel = {"position": [0.1, -0.04], "heading": heading, "load": 120.0}
+    world = plain_world(lab, {"wheel": {"table_a": wheel}})
+    body, place = world.find("table_a"), np.array([0.1, -0.04, 0.0])
+    across = np.array([-math.sin(heading), math.cos(heading), 0.0])
+    start, crept = body.pose(), 0.0
+
+    def push() -> None:
+        nonlocal crept
+        pose, twist = body.pose(), body.twist()
+        # Against the 84 N that its friction can hold, and a little along it.
+        body.apply_force(pose.matrix @ (25.0 * across + [0.5, 0.0, 0.0]), pose.point([*place[:2], -0.3]))
+        crept += float(across @ pose.matrix.T @ (twist.linear + np.cross(twist.angular, pose.matrix @ place))) / 400.0
+
+    lab.run(world, 2.0, push)
+    assert np.hypot(*(body.pose().position - start.position)[:2]) > 0.002, "it rolls"
+    assert abs(crept) < 0.001
+
+
 def test_a_wheel_slides_with_the_friction_of_its_own_load_wherever_the_body_is_pushed(lab: Any) -> None:
     for height in (-0.05, -0.6):
         wheel = {"position": [0.0, 0.0], "heading": 0.0, "load": 60.0, "sliding_friction": 0.5}

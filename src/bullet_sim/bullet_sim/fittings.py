@@ -21,7 +21,7 @@ STRUT_MASS, TIP_MASS = 0.05, 0.10
 """Mass [kg] of a strut and of the wheel or ball under it: little, so that a body is as heavy where it is as before.
 
 The wheel is a hoop. Bullet solves friction in two fixed directions by sweeps; a wheel that is much easier to roll than
-its body is to shift aside makes them converge slowly, and it creeps: with a sixth of this inertia by 5 mm/s at 0.1 m/s.
+its body is to shift aside makes them converge slowly, and it creeps, see `client.SOLVED`.
 """
 
 

@@ -221,13 +221,14 @@ def _diagnose_object(
     bases = fit_baselines(np.random.default_rng(first), track, stages, options, told)
     grip = grip_evidence(grips, options.delay_spread) if grips is not None else None
     bases = [beside_motion(each, grip) for each in bases]
-    baseline = judged(bases[0], stages, options, even=True)
-    verdict = predictive_test(baseline.over_shorter().peak, 0)
-    p_value = verdict.p_value if grip is None else least_of_two(verdict.p_value, grip.p_value)
+    # Which parameters the baseline has at its best is known only now: effects lead it to where they found them.
     explained = explain(second, track, bases, stages, grip, options)
+    baseline = judged(explained.bases[0], explained.stages, options, even=True)
+    verdict = predictive_test(baseline.peak, 0)
+    p_value = verdict.p_value if grip is None else least_of_two(verdict.p_value, grip.p_value)
     verdict = replace(verdict, p_value=with_library(p_value, explained.log_odds))
     mismatch = verdict.p_value < options.level
-    weighed = held_against(explained, options) if mismatch else ()
+    weighed = held_against(explained, baseline, options) if mismatch else ()
     scene, rng = scene_of(track, baseline.row), np.random.default_rng(third)
     found = findings_of(baseline, weighed, scene)
     residual = residual_wrench(track, baseline.row)

@@ -13,7 +13,6 @@ from pbrl_bag.types import Recording
 from pbrl_mismatch import EFFECTS, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.kernels.columns import COLUMN
-from pbrl_mismatch.kernels.path_kernel import REACTION
 from pbrl_mismatch.kernels.sense_kernel import load_now, to_truth
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import scene_of
@@ -61,10 +60,21 @@ def test_drag_along_a_path_is_the_speed_over_the_mass(track: Any, free: Any) -> 
     rows[1, COLUMN["drag_linear"]] = 10.0
     without, with_drag = along.accelerations(rows)
     where = np.concatenate([np.arange(b, e + 1, 4) for b, e in zip(track.begin, track.last, strict=True)])
-    speed = track.seen[where, 3:5]
-    # The drag is taken at the end of the reaction time, which it itself has a part in.
-    wanted = -10.0 * (speed + REACTION * without[:, :2]) / (MASS + 10.0 * REACTION)
-    np.testing.assert_allclose((with_drag - without)[:, :2], wanted, atol=1e-9)
+    np.testing.assert_allclose((with_drag - without)[:, :2], -10.0 * track.seen[where, 3:5] / MASS, atol=1e-9)
+
+
+def test_a_load_that_swings_slowly_is_left_behind_by_the_path(track: Any, free: Any) -> None:
+    # On a soft spring a load goes on as it went: it is no part of the body, and pulls with its stiffness times the way.
+    rows = free.rows(np.repeat(free.mean[None], 2, 0))
+    rows[1, [COLUMN[name] for name in ("slosh_mass", "slosh_frequency", "slosh_damping")]] = 5.0, 0.02, 0.0
+    for stride in (1, 4):
+        along = lay_along(cut_windows(track, 1.0), track.seen, MASS, FLOOR, stride)
+        without, swinging = along.accelerations(rows)
+        start = round(2.0 / track.dt / stride)
+        moved = track.seen[start * stride, :2] - track.seen[0, :2] - 2.0 * track.seen[0, 3:5]
+        pull = -5.0 * (2.0 * np.pi * 0.02) ** 2 * moved
+        found = swinging[start, :2] * (MASS - 5.0) - without[start, :2] * MASS
+        np.testing.assert_allclose(found, pull, atol=0.15 * np.hypot(*pull))
 
 
 @pytest.mark.parametrize("moved", [{"com_x": 0.1, "com_y": -0.05}, {"tag_x": 0.04, "tag_y": 0.02, "tag_theta": 0.3}])

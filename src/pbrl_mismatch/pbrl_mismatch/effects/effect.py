@@ -123,6 +123,7 @@ class Effect:
         touches: columns x, y and radius of a disc that touches the footprint, where the effect is a contact.
         pulls: columns x and y of a place in the world, then of the point of the body that is drawn to it.
         cord: column of the length below which nothing pulls.
+        rhythm: columns of a frequency and of its phase.
         remembers: whether more moves than the body, so that its past matters.
         sticks: whether it is dry friction, which a body at rest does not show the strength of.
     """
@@ -142,6 +143,7 @@ class Effect:
     touches: tuple[str, str, str] | None = None
     pulls: tuple[str, ...] = ()
     cord: str | None = None
+    rhythm: tuple[str, str] | None = None
     remembers: bool = False
     sticks: bool = False
 

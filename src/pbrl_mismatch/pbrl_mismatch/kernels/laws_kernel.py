@@ -89,12 +89,10 @@ def springs(
     time: float,
     mass: float,
     com: Array,
-    pivot: Array,
-    outline: Array,
     dt: float,
     acc: Array,
 ) -> None:
-    """Add what depends on place and time: slope, pushes from outside, cords, catches, pivots, contacts, a swing.
+    """Add what depends on place and time, and drag: slope, pushes from outside, cords, catches, a swing.
 
     Args:
         p: (WIDTH,) parameter row.
@@ -104,11 +102,12 @@ def springs(
         time: [s] on the recording's clock.
         mass: [kg] now.
         com: (2,) centre of mass in the body's frame [m] now.
-        pivot: (3,) pose of the body's frame when the episode began, which a hidden hinge holds on to.
-        outline: (E, 2) footprint, counter-clockwise.
         dt: [s].
         acc: (9,) account.
     """
+    acc[3] += p[at.DRAG_LINEAR]
+    acc[5] += p[at.DRAG_LINEAR]
+    acc[8] += p[at.DRAG_TURN]
     weight = mass * GRAVITY
     on = between(time, p[at.FORCE_START], p[at.FORCE_END])
     acc[0] += weight * p[at.SLOPE_X] + on * p[at.STEADY_X]
@@ -139,6 +138,41 @@ def springs(
         if k > 0.0 and near < 1.0:
             resist(acc, rx, ry, 1.0, 0.0, k * dt)
             resist(acc, rx, ry, 0.0, 1.0, k * dt)
+    if p[at.SLOSH_MASS] > 0.0:
+        rate = 2.0 * math.pi * p[at.SLOSH_FREQUENCY]
+        k, d = p[at.SLOSH_MASS] * rate * rate, 2.0 * p[at.SLOSH_MASS] * p[at.SLOSH_DAMPING] * rate
+        ax, ay = p[at.SLOSH_X] - com[0], p[at.SLOSH_Y] - com[1]
+        fx, fy = k * state[SLOSH] + d * state[SLOSH + 2], k * state[SLOSH + 1] + d * state[SLOSH + 3]
+        push(acc, c * ax - s * ay, s * ax + c * ay, fx, fy)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def contacts(
+    p: Array,
+    state: Array,
+    c: float,
+    s: float,
+    mass: float,
+    com: Array,
+    pivot: Array,
+    outline: Array,
+    dt: float,
+    acc: Array,
+) -> None:
+    """Add what is too stiff to be seen in a pose: pivots and contacts. See `springs` for what is not named here.
+
+    Args:
+        p: see `springs`.
+        state: see `springs`.
+        c: see `springs`.
+        s: see `springs`.
+        mass: see `springs`.
+        com: see `springs`.
+        pivot: (3,) pose of the body's frame when the episode began, which a hidden hinge holds on to.
+        outline: (E, 2) footprint, counter-clockwise.
+        dt: in which they answer [s].
+        acc: (9,) account.
+    """
     if p[at.PIVOT_STIFFNESS] > 0.0:
         k, c0, s0 = p[at.PIVOT_STIFFNESS], math.cos(pivot[2]), math.sin(pivot[2])
         dx, dy = p[at.PIVOT_X] - pivot[0], p[at.PIVOT_Y] - pivot[1]
@@ -167,12 +201,6 @@ def springs(
             push(acc, rx, ry, -force * nx, -force * ny)
             if force < 0.999 * p[at.UNSEEN_FORCE]:
                 resist(acc, rx, ry, nx, ny, UNSEEN_STIFFNESS * (dt + SETTLING))
-    if p[at.SLOSH_MASS] > 0.0:
-        rate = 2.0 * math.pi * p[at.SLOSH_FREQUENCY]
-        k, d = p[at.SLOSH_MASS] * rate * rate, 2.0 * p[at.SLOSH_MASS] * p[at.SLOSH_DAMPING] * rate
-        ax, ay = p[at.SLOSH_X] - com[0], p[at.SLOSH_Y] - com[1]
-        fx, fy = k * state[SLOSH] + d * state[SLOSH + 2], k * state[SLOSH + 1] + d * state[SLOSH + 3]
-        push(acc, c * ax - s * ay, s * ax + c * ay, fx, fy)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -180,12 +208,6 @@ def dry(p: Array) -> bool:
     """Tell whether any dry friction of the effects is on: its limit depends on the velocity it leads to."""
     floor = p[at.SLIDE_MU] + p[at.BREAKAWAY_MU] + abs(p[at.PATCH_MU]) + p[at.CASTER_ROLL] + p[at.CASTER_SCRUB]
     return floor + p[at.WHEEL2_MU_X] + max(p[at.WHEEL2_MU_Y], 0.0) > 0.0
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def rubs(p: Array) -> bool:
-    """Tell whether any resistance to motion is on."""
-    return dry(p) or p[at.DRAG_LINEAR] != 0.0 or p[at.DRAG_TURN] != 0.0
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -255,7 +277,7 @@ def resistances(
     axes: Array,
     acc: Array,
 ) -> None:
-    """Add what resists motion: drag, and dry friction at every foot and at the second wheel.
+    """Add dry friction at every foot and at the second wheel.
 
     Args:
         p: see `springs`, and so are those not named here.
@@ -271,9 +293,6 @@ def resistances(
         axes: (5,) see `fixed_axes`.
         acc: (9,) account.
     """
-    acc[3] += p[at.DRAG_LINEAR]
-    acc[5] += p[at.DRAG_LINEAR]
-    acc[8] += p[at.DRAG_TURN]
     count = feet.shape[0]
     load = mass * GRAVITY / count
     slides = p[at.SLIDE_MU] > 0.0 or p[at.BREAKAWAY_MU] > 0.0

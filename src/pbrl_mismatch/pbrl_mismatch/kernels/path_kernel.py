@@ -6,17 +6,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_mismatch.kernels import places as at
+from pbrl_mismatch.kernels.contact_kernel import move_unseen
+from pbrl_mismatch.kernels.laws_kernel import contacts, springs
 from pbrl_mismatch.kernels.motion_kernel import BEGIN, LAST, rehearse
 from pbrl_mismatch.kernels.sense_kernel import acting, load_now, to_truth
 from pbrl_mismatch.kernels.state import STATE
-from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body
+from pbrl_mismatch.kernels.step_kernel import fixed_axes, remember, respond
+from pbrl_model.kernel import cos_sin
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 REACTION = 0.1
-"""Time in which dry friction answers to the path's speed [s]: where a body stands, what smoothing leaves of its speed
-is stopped in that time and not within a step, which would be a blow."""
+"""Time in which dry friction and hard contacts answer to the path's speed [s]: where a body stands, what smoothing
+leaves of its speed is stopped in that time and not within a step, which would be a blow."""
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -38,7 +42,9 @@ def accelerate_along(
     """Write how each row's model accelerates the body along one path, at the nominal centre of mass.
 
     A centre of mass off the nominal one, or a tag that is, makes the true centre move on a path of its own; what it
-    does is taken back to the point that tags see.
+    does is taken back to the point that tags see. Where the body is and how fast it goes is known along a path: springs
+    and dampers answer to that at once, and what else moves in it follows that. Dry friction and hard contacts, which a
+    millimetre more or less turns off or on, are solved for.
 
     Args:
         rows: (P, WIDTH).
@@ -56,10 +62,10 @@ def accelerate_along(
         out: (P, ceil(T / stride), 3) [m/s^2, m/s^2, rad/s^2], written.
     """
     state, com, acc, wrench = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3)
-    axes, dt = np.empty(5), REACTION
+    axes, dt = np.empty(5), body[3]
     for r in range(rows.shape[0]):
         p = rows[r]
-        fixed_axes(p, body[3], axes)
+        fixed_axes(p, REACTION, axes)
         _, _ = load_now(p, clock[span[0]], body, com)
         rehearse(p, seen, span, body, outline, feet, com, state)
         for n in range(out.shape[1]):
@@ -71,8 +77,28 @@ def accelerate_along(
             acting(
                 p, felt, mount, seen, step, span[BEGIN], span[LAST], clock[step], clock[span[BEGIN]], body, com, wrench
             )
-            step_body(p, state, wrench, clock[step], mass, inertia, com, pivot, outline, feet, axes, acc, dt)
-            turn = (state[5] - omega) / dt
-            out[r, n, 0] = (state[3] - vx) / dt - turn * ry - omega * omega * rx
-            out[r, n, 1] = (state[4] - vy) / dt + turn * rx - omega * omega * ry
+            # As in `step_body`, forces act where the body is at the end of a step.
+            state[0] += vx * dt
+            state[1] += vy * dt
+            state[2] += omega * dt
+            c, s = cos_sin(state[2])
+            if p[at.UNSEEN_FORCE] > 0.0:
+                move_unseen(p, outline, state, c, s, com)
+            acc[:3] = wrench
+            acc[3:] = 0.0
+            springs(p, state, c, s, clock[step], mass, com, dt, acc)
+            acc[0] -= acc[3] * vx + acc[4] * vy + acc[6] * omega
+            acc[1] -= acc[4] * vx + acc[5] * vy + acc[7] * omega
+            acc[2] -= acc[6] * vx + acc[7] * vy + acc[8] * omega
+            acc[3:] = 0.0
+            contacts(p, state, c, s, mass, com, pivot, outline, REACTION, acc)
+            _, _, _ = respond(p, state, c, s, mass, inertia, com, feet, axes, acc, REACTION)
+            turn = (state[5] - omega) / REACTION
+            out[r, n, 0] = (state[3] - vx) / REACTION - turn * ry - omega * omega * rx
+            out[r, n, 1] = (state[4] - vy) / REACTION + turn * rx - omega * omega * ry
             out[r, n, 2] = turn
+            state[3], state[4], state[5] = vx, vy, omega
+            after = min(t + stride, path.shape[0] - 1)
+            passed = max(after - t, 1) * dt
+            ax, ay = (path[after, 3] - path[t, 3]) / passed, (path[after, 4] - path[t, 4]) / passed
+            remember(p, state, ax, ay, (path[after, 5] - path[t, 5]) / passed, c, s, com, feet, passed)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.contact_kernel import move_unseen
-from pbrl_mismatch.kernels.laws_kernel import CREEP, dry, resistances, rubs, springs, swivel
+from pbrl_mismatch.kernels.laws_kernel import CREEP, contacts, dry, resistances, springs, swivel
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
 from pbrl_model.kernel import ERROR_BIAS, GRAVITY, SINGULAR, box_impulses, cos_sin, joint_rows
 
@@ -177,6 +177,83 @@ def swing_load(
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def respond(
+    p: Array,
+    state: Array,
+    c: float,
+    s: float,
+    mass: float,
+    inertia: float,
+    com: Array,
+    feet: Array,
+    axes: Array,
+    acc: Array,
+    dt: float,
+) -> tuple[float, float, float]:
+    """Change the velocity by what is in an account, by dry friction, and by the impulses of hinge and wheel.
+
+    Args:
+        p: see `step_body`, and so are those not named here.
+        state: changed.
+        c: cosine of the heading.
+        s: sine of the heading.
+        mass: see `step_body`.
+        inertia: see `step_body`.
+        com: see `step_body`.
+        feet: see `step_body`.
+        axes: see `step_body`.
+        acc: (9,) account, see `laws_kernel`.
+        dt: in which that happens [s].
+
+    Returns:
+        The acceleration (x, y, turn) without those impulses.
+    """
+    vx, vy, omega = state[3], state[4], state[5]
+    if dry(p):
+        b3, b4, b5, b6, b7, b8 = acc[3], acc[4], acc[5], acc[6], acc[7], acc[8]
+        for _ in range(SWEEPS):
+            acc[3], acc[4], acc[5], acc[6], acc[7], acc[8] = b3, b4, b5, b6, b7, b8
+            resistances(p, state, c, s, vx, vy, omega, mass, com, feet, axes, acc)
+            ux, uy, turn = vx, vy, omega
+            vx, vy, omega = solve_resisted(state, mass, inertia, acc, dt)
+            if abs(vx - ux) + abs(vy - uy) + abs(omega - turn) < SAME:
+                break
+    else:
+        vx, vy, omega = solve_resisted(state, mass, inertia, acc, dt)
+    ax, ay, turned = (vx - state[3]) / dt, (vy - state[4]) / dt, (omega - state[5]) / dt
+    state[3], state[4], state[5] = vx, vy, omega
+    hold(p, state, c, s, mass, inertia, com, axes, dt)
+    if p[at.MU_GROUND] > 0.0:
+        ground = p[at.MU_GROUND] * GRAVITY * dt
+        speed = math.sqrt(state[3] ** 2 + state[4] ** 2 + inertia / mass * state[5] ** 2)
+        kept = 1.0 - ground / speed if speed > ground else 0.0
+        state[3] *= kept
+        state[4] *= kept
+        state[5] *= kept
+    return ax, ay, turned
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def remember(
+    p: Array,
+    state: Array,
+    ax: float,
+    ay: float,
+    turned: float,
+    c: float,
+    s: float,
+    com: Array,
+    feet: Array,
+    dt: float,
+) -> None:
+    """Move what else there is in a body by `dt` [s]: a load by the body's acceleration, casters by its velocity."""
+    if p[at.SLOSH_MASS] > 0.0:
+        swing_load(p, state, ax, ay, turned, c, s, com, dt)
+    if p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0:
+        turn_casters(p, state, c, s, com, feet, dt)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def step_body(
     p: Array,
     state: Array,
@@ -202,7 +279,7 @@ def step_body(
         mass: [kg] now.
         inertia: [kg m^2] now.
         com: (2,) centre of mass in the body's frame [m] now.
-        pivot: (3,) see `springs`.
+        pivot: (3,) see `contacts`.
         outline: (E, 2) footprint.
         feet: (F, 2) points that carry the load.
         axes: (5,) see `fixed_axes`.
@@ -217,31 +294,8 @@ def step_body(
         move_unseen(p, outline, state, c, s, com)
     acc[0], acc[1], acc[2] = wrench[0], wrench[1], wrench[2]
     acc[3:] = 0.0
-    springs(p, state, c, s, time, mass, com, pivot, outline, dt, acc)
-    vx, vy, omega = state[3], state[4], state[5]
-    b3, b4, b5, b6, b7, b8 = acc[3], acc[4], acc[5], acc[6], acc[7], acc[8]
-    if rubs(p):
-        for _ in range(SWEEPS if dry(p) else 1):
-            acc[3], acc[4], acc[5], acc[6], acc[7], acc[8] = b3, b4, b5, b6, b7, b8
-            resistances(p, state, c, s, vx, vy, omega, mass, com, feet, axes, acc)
-            ux, uy, turn = vx, vy, omega
-            vx, vy, omega = solve_resisted(state, mass, inertia, acc, dt)
-            if abs(vx - ux) + abs(vy - uy) + abs(omega - turn) < SAME:
-                break
-    else:
-        vx, vy, omega = solve_resisted(state, mass, inertia, acc, dt)
-    ax, ay, turned = (vx - state[3]) / dt, (vy - state[4]) / dt, (omega - state[5]) / dt
-    state[3], state[4], state[5] = vx, vy, omega
-    hold(p, state, c, s, mass, inertia, com, axes, dt)
-    if p[at.MU_GROUND] > 0.0:
-        ground = p[at.MU_GROUND] * GRAVITY * dt
-        speed = math.sqrt(state[3] ** 2 + state[4] ** 2 + inertia / mass * state[5] ** 2)
-        kept = 1.0 - ground / speed if speed > ground else 0.0
-        state[3] *= kept
-        state[4] *= kept
-        state[5] *= kept
-    if p[at.SLOSH_MASS] > 0.0:
-        swing_load(p, state, ax, ay, turned, c, s, com, dt)
-    if p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0:
-        turn_casters(p, state, c, s, com, feet, dt)
+    springs(p, state, c, s, time, mass, com, dt, acc)
+    contacts(p, state, c, s, mass, com, pivot, outline, dt, acc)
+    ax, ay, turned = respond(p, state, c, s, mass, inertia, com, feet, axes, acc, dt)
+    remember(p, state, ax, ay, turned, c, s, com, feet, dt)
     return c, s

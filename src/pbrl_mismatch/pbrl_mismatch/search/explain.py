@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.track import Track
@@ -16,10 +17,14 @@ from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, judged
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
-from pbrl_mismatch.search.library import search_library, trace
+from pbrl_mismatch.search.hypothesis import Hypothesis
+from pbrl_mismatch.search.library import BENT, search_library, trace
 from pbrl_mismatch.search.objective import Objective
+from pbrl_mismatch.search.path.ground import traced
 from pbrl_mismatch.search.predictive import predictive_test
 from pbrl_mismatch.search.weigh import Weighed, veto, weigh
+
+Array = NDArray[np.float64]
 
 GROUNDS_OF_SETS = 1
 """So many of the likeliest hypotheses are tried with one effect more."""
@@ -31,6 +36,8 @@ POLISHED, LONGER = 5, 2
 """So many of the likeliest effects are climbed on, for so many times the usual steps."""
 LEADS = 3
 """So many of the likeliest effects lead a baseline to where they have the body's own parameters."""
+LED = 100.0
+"""Kinds of baseline that are worse than the best by more [nat] are not led: no other top would do."""
 NEAR_THE_FLOOR = 1.1
 """A hypothesis that needs less than this scale of the noise leaves nothing worth another effect."""
 WORTH_A_KIND = 3.0
@@ -82,7 +89,9 @@ def explain(
     tried = _tried(seeds[0], track, _grounds(bases), stages, grip, options)
     bases = _reached(bases, tried, stages, options)
     singles = weigh(bases, tried, options)
-    if min(each.noise_scale for each in tried) > REACHED and len(stages.fitted) > 1:
+    if _falls_short(tried) and len(stages.fitted) > 1:
+        tried = _polished(singles, tried, stages, options)
+    if _falls_short(tried) and len(stages.fitted) > 1:
         stages, bases = stages.without_longest(), [each.over_shorter() for each in bases]
         bases = sorted(bases, key=lambda each: -each.evidence)
         tried = [beside_motion(each.over_shorter(), grip) for each in tried]
@@ -102,16 +111,21 @@ def explain(
     return Explained(weighed, bases, stages, odds)
 
 
+def _falls_short(tried: list[Fitted]) -> bool:
+    """Tell whether nothing that was tried predicts the windows it was fitted to."""
+    return min(each.noise_scale for each in tried) > REACHED
+
+
 def _reached(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: DiagnoseOptions) -> list[Fitted]:
     """Return the baselines climbed on from where likely effects have mass and wheel, best first.
 
     Where bodies stick there are many tops. An effect that does nothing but lead to a better one explains nothing.
     """
     likely = sorted((each for each in tried if GRASP_COMPLIANCE not in each.hypothesis.effects), key=_lowest)[:LEADS]
-    climbed = []
+    best, climbed = max(base.evidence for base in bases), []
     for base in bases:
         found = base
-        for each in likely:
+        for each in likely if base.evidence > best - LED else []:
             found = _climbed_on(found, each, stages, options)
         climbed.append(found)
     return sorted(climbed, key=_lowest)
@@ -143,23 +157,40 @@ def _polished(
 
 
 def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseOptions) -> Fitted:
+    """Return a hypothesis climbed on from where it is, and from where another has the body's own parameters."""
     own = fitted.peak.coordinates[0]
-    crossed = own.copy()
-    effect = {column for name in fitted.hypothesis.effects for v in EFFECTS[name].variants for column in v}
-    for k, column in enumerate(fitted.hypothesis.columns):
-        if column in best.hypothesis.columns and column not in effect:
-            crossed[k] = best.peak.coordinates[0, best.hypothesis.columns.index(column)]
-    starts = [own, crossed] + ([fitted.traced.coordinates] if fitted.traced is not None else [])
+    starts = [own, _crossed(fitted.hypothesis, own, best.hypothesis, best.peak.coordinates[0])]
+    starts += [_afresh(fitted.hypothesis, own)] if fitted.hypothesis.effects else []
+    starts += [fitted.traced.coordinates] if fitted.traced is not None else []
     objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
     peak = climb(objective, np.array(starts), iterations=LONGER * options.iterations[-1])
-    if not float(peak.evidence.max()) > float(fitted.peak.evidence[0]):
-        return fitted
-    return replace(fitted, peak=alone(peak))
+    better = float(peak.evidence.max()) > float(fitted.peak.evidence[0])
+    found = replace(fitted, peak=alone(peak)) if better else fitted
+    if found.traced is None or best.traced is None or not best.traced.evidence > found.traced.evidence:
+        return found
+    along = _crossed(fitted.hypothesis, found.traced.coordinates, best.hypothesis, best.traced.coordinates)
+    other = traced(fitted.hypothesis, along[None], stages.fitted[-1], options.sensor_floor)
+    return replace(found, traced=other) if other.evidence > found.traced.evidence else found
 
 
-def held_against(explained: Explained, options: DiagnoseOptions) -> tuple[Weighed, ...]:
-    """Return the hypotheses with the likeliest held against what was held out of their fits."""
-    baseline = judged(explained.bases[0], explained.stages, options, even=True)
+def _crossed(hypothesis: Hypothesis, own: Array, other: Hypothesis, coordinates: Array) -> Array:
+    """Return the coordinates (K,) of a hypothesis with the body's own parameters as another one has them."""
+    crossed = own.copy()
+    effect = {column for name in hypothesis.effects for v in EFFECTS[name].variants for column in v}
+    for k, column in enumerate(hypothesis.columns):
+        if column in other.columns and column not in effect:
+            crossed[k] = coordinates[other.columns.index(column)]
+    return crossed
+
+
+def _afresh(hypothesis: Hypothesis, own: Array) -> Array:
+    """Return the coordinates (K,) of a hypothesis with what a wrong ground bends as it was believed to be."""
+    bent = np.array([column in BENT for column in hypothesis.columns])
+    return np.where(bent, hypothesis.mean, own)
+
+
+def held_against(explained: Explained, baseline: Fitted, options: DiagnoseOptions) -> tuple[Weighed, ...]:
+    """Return the hypotheses with the likeliest held against what was held out of their fits, beside the baseline's."""
     return veto(explained.weighed, baseline, partial(judged, stages=explained.stages, options=options))
 
 

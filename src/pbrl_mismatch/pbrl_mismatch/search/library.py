@@ -22,6 +22,7 @@ from pbrl_mismatch.search.path.climb import PathPeak, climb_along
 from pbrl_mismatch.search.path.contacts import contact_points, with_contacts
 from pbrl_mismatch.search.path.ground import Ground, ground_of, traced
 from pbrl_mismatch.search.path.pulls import with_pulls
+from pbrl_mismatch.search.path.rhythms import with_rhythms
 from pbrl_mismatch.search.path.screen import screen
 from pbrl_mismatch.search.predictive import BELIEVED
 
@@ -35,9 +36,14 @@ CLOSE = (20.0, 10.0)
 """Effects this near to the likeliest [nat] all go on: from the path to windows, and from those to longer ones."""
 KEPT = frozenset({"wheel_x", "wheel_y", "wheel_theta", "hinge_x", "hinge_y", "hinge_radius"})
 """Columns of a ground that every start has as the ground has them."""
+BENT = BELIEVED | {"mu_x", "mu_y"}
+"""Columns of a ground that bend to what it lacks: half of the starts have them as they were believed to be."""
 RESTLESS = 1.12
 """Where no law needs less than this scale of the noise along the path, bodies stick: dry friction is then simulated
 whatever the path says of it."""
+UNTOLD = 50.0
+"""Where a ground is likelier along its path than simulated by more [nat], every effect is simulated: friction stands in
+for what holds the body, and its path alone does not tell them apart."""
 LEADING = 3
 """So many effects that are the likeliest along the path are simulated to the end."""
 BEGUN, CLIMBED = 3, 5
@@ -69,7 +75,7 @@ def starts_of(
             # What an effect did, the ground has taken on as far as it could: half begin at what was believed before.
             draws[:, k] = np.where(
                 afresh & (column not in KEPT),
-                hypothesis.mean[k] if column in BELIEVED else draws[:, k],
+                hypothesis.mean[k] if column in BENT else draws[:, k],
                 ground.coordinates[base.hypothesis.columns.index(column)],
             )
     if effect.touches is not None:
@@ -80,11 +86,14 @@ def starts_of(
         point = (at[0], at[1]) if at else None
         cord = hypothesis.columns.index(effect.cord) if effect.cord else None
         draws = with_pulls(rng, draws, (x, y), point, cord, track, lacks)
+    if effect.rhythm is not None and effect.rhythm[0] in hypothesis.columns:
+        frequency, phase = (hypothesis.columns.index(name) for name in effect.rhythm)
+        draws = with_rhythms(rng, draws, frequency, phase, lacks, track.gyration)
     ranked, misfit = screen(ground, hypothesis, effect, draws)
     halves = [half for half in (~afresh, afresh) if half.any()]
     starts = np.concatenate([_best_of(ranked, misfit, half, hypothesis, options) for half in halves])
     along = ground.fine.along if effect.remembers else ground.climbed
-    begun = climb_along(along, hypothesis, starts, BEGUN)
+    begun = climb_along(along if effect.remembers else ground.first.along, hypothesis, starts, BEGUN)
     best = begun.coordinates[np.argsort(-begun.evidence, kind="stable")]
     return climb_along(along, hypothesis, apart(best, hypothesis.spread, options.keep[0]), CLIMBED)
 
@@ -130,7 +139,9 @@ def search_library(
 
     with ThreadPoolExecutor(options.workers) as pool:
         begun = list(pool.map(begin, range(len(jobs))))
-        chosen = _survivors([each.hypothesis for each in begun], begun, options.shortlist, CLOSE[0])
+        stands_in = any(_path_above_simulation(base) > UNTOLD for base in bases)
+        most = len(EFFECTS) if stands_in else options.shortlist
+        chosen = _survivors([each.hypothesis for each in begun], begun, most, CLOSE[0])
         if min(each.noise_scale for each in begun) > RESTLESS:
             chosen = sorted({*chosen, *(k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].sticks)})
         running = [(begun[k].hypothesis, begun[k].coordinates) for k in chosen]
@@ -168,6 +179,11 @@ def search_library(
 def trace(longest: Cuts, options: DiagnoseOptions, fitted: Fitted, starts: Array) -> Fitted:
     """Return a fitted hypothesis with its fit along the recorded path, from starts (n, K)."""
     return replace(fitted, traced=traced(fitted.hypothesis, starts, longest, options.sensor_floor))
+
+
+def _path_above_simulation(base: Fitted) -> float:
+    """Return how much likelier a hypothesis is along its path than simulated [nat]."""
+    return base.traced.evidence - float(base.peak.evidence[0]) if base.traced is not None else 0.0
 
 
 def _same(name: str, base: Fitted, options: DiagnoseOptions) -> bool:

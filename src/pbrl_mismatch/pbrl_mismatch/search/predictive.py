@@ -7,6 +7,8 @@ such a wrench would explain (D numbers) and the rest (R numbers). If the model i
     F = (|explained|^2 / D) / (|rest|^2 / R)  ~  F(D, R):
 
 the noise is estimated in the same breath, so that a tag which is a little better or worse than thought is no mismatch.
+So is the size of the sensor's own error, up to what was told: with one that is larger than it is, the test would be
+blunt and its p-values too high.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from scipy.stats import f as f_distribution
 
 from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.search.climb import Peak
+from pbrl_mismatch.search.objective import START, WRENCH
 
 Array = NDArray[np.float64]
 
@@ -28,6 +31,8 @@ TEST_STEP = 0.3
 """Finite difference in a knot's force [N]; times the radius of gyration for the torque."""
 TELLING = 0.05
 """A direction that one newton moves by less than this many standard deviations tells nothing."""
+FLOORS = (1.0, 0.6, 0.3, 0.1, 0.03)
+"""Shares of the sensor's own error that the windows are asked for; the likeliest counts, none is larger than told."""
 
 BELIEVED = frozenset({"mass", "inertia_factor", "delay"})
 """Columns of the baseline of which something is known beforehand."""
@@ -89,41 +94,85 @@ def predictive_test(peak: Peak, row: int) -> Verdict:
     rows = np.repeat(objective.hypothesis.rows(u), 1 + 3 * KNOTS, 0)
     found = poses(rows, cuts, np.repeat(told[None], len(rows), 0), extra)
     push = ((found[1:] - found[:1]) * cuts.weight / TEST_STEP).reshape(3 * KNOTS, len(cuts), -1)
-    residual, slopes, pushes, owners = [], [], [], []
+    windows = []
     for w in range(len(cuts)):
         seen = cuts.weight[w].reshape(-1) > 0.0
         spread = linear.spread[0, w][seen]
         # The residual that would be left with no nuisance, to first order; its covariance is I + S S^T.
         centred = linear.residual[0, w][seen] + spread @ z[0, w]
-        whiten = np.linalg.inv(np.linalg.cholesky(np.eye(len(centred)) + spread @ spread.T))
-        residual.append(whiten @ centred)
-        slopes.append(whiten @ linear.slope[0, w][seen])
-        left, size, _ = np.linalg.svd(whiten @ push[:, w][:, seen].T, full_matrices=False)
-        pushes.append(left[:, size > TELLING])
-        owners.append(np.full(len(centred), w))
-    verdict = _split(np.concatenate(residual), np.concatenate(slopes), pushes, np.concatenate(owners), len(cuts))
+        windows.append(_Window(centred, linear.slope[0, w][seen], spread, push[:, w][:, seen].T))
+    white = max((_whiten(windows, share) for share in FLOORS), key=lambda each: each.log_likelihood)
+    verdict = _split(white)
     conflict = belief_conflict(peak, row)
     return replace(verdict, p_value=min(verdict.p_value, conflict)) if conflict < UNBELIEVABLE else verdict
 
 
-def _split(residual: Array, slopes: Array, pushes: list[Array], owners: NDArray[np.int64], windows: int) -> Verdict:
+@dataclass(frozen=True)
+class _Window:
+    """One window: residual (R,), and slopes in parameters (R, K), nuisances (R, NUISANCES) and knots (R, 3 KNOTS)."""
+
+    residual: Array
+    slope: Array
+    spread: Array
+    push: Array
+
+
+@dataclass(frozen=True)
+class _White:
+    """All windows, whitened: residual (R,) and own slopes (R, M) as an orthonormal basis, what knots do by window."""
+
+    residual: Array
+    own: Array
+    pushes: list[Array]
+    log_det: float
+
+    @property
+    def free(self) -> Array:
+        """Return (R,) the residual without what the model's own parameters could do."""
+        return np.asarray(self.residual - self.own @ (self.own.T @ self.residual))
+
+    @property
+    def log_likelihood(self) -> float:
+        """Return the log likelihood at the best scale of the noise, up to what all floors share [nat]."""
+        count = len(self.residual)
+        return -0.5 * count * float(np.log(max(np.sum(self.free**2) / count, 1e-12))) - self.log_det
+
+
+def _whiten(windows: list[_Window], share: float) -> _White:
+    """Whiten windows whose sensor has this share of its floor."""
+    residual, slopes, pushes, log_det = [], [], [], 0.0
+    scale = np.array([1.0] * START + [share] * WRENCH)
+    for each in windows:
+        spread = each.spread * scale
+        factor = np.linalg.cholesky(np.eye(len(each.residual)) + spread @ spread.T)
+        log_det += float(np.log(np.diag(factor)).sum())
+        whiten = np.linalg.inv(factor)
+        residual.append(whiten @ each.residual)
+        slopes.append(whiten @ each.slope)
+        left, size, _ = np.linalg.svd(whiten @ each.push, full_matrices=False)
+        pushes.append(left[:, size > TELLING])
+    slope = np.concatenate(slopes)
+    norms = np.linalg.norm(slope, axis=0)
+    own, strength, _ = np.linalg.svd(slope[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
+    return _White(np.concatenate(residual), own[:, strength > 1e-6], pushes, log_det)
+
+
+def _split(white: _White) -> Verdict:
     """Split the whitened residual into what wrenches explain and the rest, both free of the model's own slopes."""
-    sizes = [each.shape[1] for each in pushes]
-    basis = np.zeros((len(residual), sum(sizes)))
+    own, free, windows = white.own, white.free, len(white.pushes)
+    sizes = [each.shape[1] for each in white.pushes]
+    owners = np.repeat(np.arange(windows), [len(each) for each in white.pushes])
+    basis = np.zeros((len(free), sum(sizes)))
     row = column = 0
-    for each in pushes:
+    for each in white.pushes:
         basis[row : row + len(each), column : column + each.shape[1]] = each
         row, column = row + len(each), column + each.shape[1]
-    norms = np.linalg.norm(slopes, axis=0)
-    own, strength, _ = np.linalg.svd(slopes[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
-    own = own[:, strength > 1e-6]
-    free = residual - own @ (own.T @ residual)
     basis, upper = np.linalg.qr(basis - own @ (own.T @ basis))
     basis = basis[:, np.abs(np.diag(upper)) > 1e-8]
     explained = basis @ (basis.T @ free)
     rest = free - explained
     d = basis.shape[1]
-    r = max(len(residual) - d - own.shape[1], 1)
+    r = max(len(free) - d - own.shape[1], 1)
     if d == 0:
         return Verdict(1.0, 0.0, 0, r, float(np.sqrt(np.sum(rest**2) / r)), np.zeros(windows))
     statistic = float(np.sum(explained**2) / d / max(np.sum(rest**2) / r, 1e-12))

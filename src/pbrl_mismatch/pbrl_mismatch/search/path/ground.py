@@ -18,7 +18,7 @@ from pbrl_mismatch.search.path.climb import climb_along, weights
 
 Array = NDArray[np.float64]
 
-COARSE, MIDDLING, FINE = 8, 4, 1
+COARSE, MIDDLING, FINE = 8, 4, 2
 """Steps between accelerations: for a first look, for a climb, and where more moves than the body."""
 ITERATIONS = 5
 
@@ -83,7 +83,7 @@ class Ground:
 
     @cached_property
     def fine(self) -> Look:
-        """Return the same step by step."""
+        """Return the same in small steps."""
         return self._look(self.along(FINE))
 
     def _look(self, along: Along) -> Look:
