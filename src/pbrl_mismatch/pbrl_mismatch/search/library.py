@@ -15,16 +15,12 @@ from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import Peak, climb
-from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart, scene_of
+from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Objective
-from pbrl_mismatch.search.path.climb import PathPeak, climb_along
-from pbrl_mismatch.search.path.contacts import contact_points, with_contacts
-from pbrl_mismatch.search.path.ground import Ground, ground_of, traced
-from pbrl_mismatch.search.path.pulls import with_pulls
-from pbrl_mismatch.search.path.rhythms import with_rhythms
-from pbrl_mismatch.search.path.screen import screen
-from pbrl_mismatch.search.predictive import BELIEVED
+from pbrl_mismatch.search.path.climb import PathPeak
+from pbrl_mismatch.search.path.ground import ground_of, traced
+from pbrl_mismatch.search.path.starts import starts_of
 
 Array = NDArray[np.float64]
 
@@ -34,10 +30,6 @@ AS_GOOD = 40.0
 """Variants of an effect that are worse than its best by more [nat] are given up."""
 CLOSE = (20.0, 10.0)
 """Effects this near to the likeliest [nat] all go on: from the path to windows, and from those to longer ones."""
-KEPT = frozenset({"wheel_x", "wheel_y", "wheel_theta", "hinge_x", "hinge_y", "hinge_radius"})
-"""Columns of a ground that every start has as the ground has them."""
-BENT = BELIEVED | {"mu_x", "mu_y"}
-"""Columns of a ground that bend to what it lacks: half of the starts have them as they were believed to be."""
 RESTLESS = 1.12
 """Where no law needs less than this scale of the noise along the path, bodies stick: dry friction is then simulated
 whatever the path says of it."""
@@ -46,64 +38,6 @@ UNTOLD = 50.0
 for what holds the body, and its path alone does not tell them apart."""
 LEADING = 3
 """So many effects that are the likeliest along the path are simulated to the end."""
-BEGUN, CLIMBED = 3, 5
-"""Steps along the path of all starts of a hypothesis, and of the best of them."""
-
-
-def starts_of(
-    rng: np.random.Generator, name: str, variant: int, base: Fitted, ground: Ground, options: DiagnoseOptions
-) -> PathPeak:
-    """Return one variant of an effect on top of a fitted hypothesis, climbed along the path, likeliest first.
-
-    Args:
-        rng: of the draws.
-        name: effect.
-        variant: which of its sub-models.
-        base: what it is laid on.
-        ground: the same along its path.
-        options: settings.
-    """
-    effect = EFFECTS[name]
-    track, lacks = ground.cuts.track, ground.lacks
-    hypothesis = base.hypothesis.with_effect(effect, scene_of(track, base.row), variant)
-    drawn = [name for name in effect.variants[variant] if name not in effect.linear]
-    count = max(options.draws * len(drawn) // 3, 2)
-    draws = hypothesis.sample_prior(rng, max(count // 4, 8) if effect.remembers else count)
-    afresh = np.arange(len(draws)) % 2 == 1
-    for k, column in enumerate(hypothesis.columns):
-        if column in base.hypothesis.columns:
-            # What an effect did, the ground has taken on as far as it could: half begin at what was believed before.
-            draws[:, k] = np.where(
-                afresh & (column not in KEPT),
-                hypothesis.mean[k] if column in BENT else draws[:, k],
-                ground.coordinates[base.hypothesis.columns.index(column)],
-            )
-    if effect.touches is not None:
-        x, y, radius = (hypothesis.columns.index(column) for column in effect.touches)
-        draws = with_contacts(rng, draws, (x, y, radius), *contact_points(track, lacks))
-    if effect.pulls:
-        x, y, *at = (hypothesis.columns.index(name) for name in effect.pulls if name in hypothesis.columns)
-        point = (at[0], at[1]) if at else None
-        cord = hypothesis.columns.index(effect.cord) if effect.cord else None
-        draws = with_pulls(rng, draws, (x, y), point, cord, track, lacks)
-    if effect.rhythm is not None and effect.rhythm[0] in hypothesis.columns:
-        frequency, phase = (hypothesis.columns.index(name) for name in effect.rhythm)
-        draws = with_rhythms(rng, draws, frequency, phase, lacks, track.gyration)
-    ranked, misfit = screen(ground, hypothesis, effect, draws)
-    halves = [half for half in (~afresh, afresh) if half.any()]
-    starts = np.concatenate([_best_of(ranked, misfit, half, hypothesis, options) for half in halves])
-    along = ground.fine.along if effect.remembers else ground.climbed
-    begun = climb_along(along if effect.remembers else ground.first.along, hypothesis, starts, BEGUN)
-    best = begun.coordinates[np.argsort(-begun.evidence, kind="stable")]
-    return climb_along(along, hypothesis, apart(best, hypothesis.spread, options.keep[0]), CLIMBED)
-
-
-def _best_of(
-    draws: Array, misfit: Array, among: NDArray[np.bool_], hypothesis: Hypothesis, options: DiagnoseOptions
-) -> Array:
-    """Return the best draws among some of them."""
-    order = np.argsort(misfit[among], kind="stable")
-    return apart(draws[among][order], hypothesis.spread, -(-options.candidates // 2))
 
 
 def search_library(

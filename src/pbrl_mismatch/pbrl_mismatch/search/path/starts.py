@@ -1,0 +1,120 @@
+"""Where a hypothesis begins: draws of its prior, some put where the lacking wrench points, climbed along the path."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.effects.effect import Effect
+from pbrl_mismatch.effects.registry import EFFECTS
+from pbrl_mismatch.options import DiagnoseOptions
+from pbrl_mismatch.search.fitted import Fitted, apart, scene_of
+from pbrl_mismatch.search.hypothesis import Hypothesis
+from pbrl_mismatch.search.path.climb import PathPeak, climb_along
+from pbrl_mismatch.search.path.contacts import contact_points, with_contacts
+from pbrl_mismatch.search.path.ground import Ground
+from pbrl_mismatch.search.path.pulls import with_pulls
+from pbrl_mismatch.search.path.rhythms import with_rhythms
+from pbrl_mismatch.search.path.screen import screen
+from pbrl_mismatch.search.predictive import BELIEVED
+
+Array = NDArray[np.float64]
+
+BENT = BELIEVED | {"mu_x", "mu_y"}
+"""Columns of a ground that bend to what it lacks: half of the starts have them as they were believed to be."""
+KEPT = frozenset({"wheel_x", "wheel_y", "wheel_theta", "hinge_x", "hinge_y", "hinge_radius"})
+"""Columns of a ground that every start has as the ground has them."""
+PARENTS, NEARBY = 3, 0.15
+"""Of the draws of each half so many are drawn about again; how far, in standard deviations of the prior."""
+BEGUN, CLIMBED = 3, 5
+"""Steps along the path of all starts of a hypothesis, and of the best of them."""
+
+
+def starts_of(
+    rng: np.random.Generator, name: str, variant: int, base: Fitted, ground: Ground, options: DiagnoseOptions
+) -> PathPeak:
+    """Return one variant of an effect on top of a fitted hypothesis, climbed along the path, likeliest first.
+
+    Args:
+        rng: of the draws.
+        name: effect.
+        variant: which of its sub-models.
+        base: what it is laid on.
+        ground: the same along its path.
+        options: settings.
+    """
+    effect = EFFECTS[name]
+    hypothesis = base.hypothesis.with_effect(effect, scene_of(ground.cuts.track, base.row), variant)
+    draws, afresh = _drawn(rng, hypothesis, effect, variant, base, ground, options)
+    ranked, misfit = screen(ground, hypothesis, effect, draws)
+    searched = _searched(effect, variant)
+    if searched:
+        # Edges in time and borders are met by few draws and felt from nearby only: the best ones are drawn about again.
+        parents = np.concatenate([_first_of(misfit, half) for half in (~afresh, afresh)])
+        parents = np.resize(parents, len(draws))
+        moved = np.isin(hypothesis.columns, searched) * NEARBY * hypothesis.spread
+        near = hypothesis.believable(ranked[parents] + moved * rng.standard_normal((len(draws), len(moved))))
+        again, rest = screen(ground, hypothesis, effect, near)
+        ranked, misfit = np.concatenate([ranked, again]), np.concatenate([misfit, rest])
+        afresh = np.concatenate([afresh, afresh[parents]])
+    halves = [half for half in (~afresh, afresh) if half.any()]
+    starts = np.concatenate([_best_of(ranked, misfit, half, hypothesis, options) for half in halves])
+    along = ground.fine.along if effect.remembers else ground.climbed
+    begun = climb_along(along if effect.remembers else ground.first.along, hypothesis, starts, BEGUN)
+    best = begun.coordinates[np.argsort(-begun.evidence, kind="stable")]
+    return climb_along(along, hypothesis, apart(best, hypothesis.spread, options.keep[0]), CLIMBED)
+
+
+def _searched(effect: Effect, variant: int) -> list[str]:
+    """Return the columns of a variant that are drawn, the others are solved for."""
+    return [column for column in effect.variants[variant] if column not in effect.linear]
+
+
+def _drawn(
+    rng: np.random.Generator,
+    hypothesis: Hypothesis,
+    effect: Effect,
+    variant: int,
+    base: Fitted,
+    ground: Ground,
+    options: DiagnoseOptions,
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return draws (n, K), and which of them have the ground's own columns as they were believed to be (n,)."""
+    track, lacks, columns = ground.cuts.track, ground.lacks, hypothesis.columns
+    count = max(options.draws * len(_searched(effect, variant)) // 3, 2)
+    draws = hypothesis.sample_prior(rng, max(count // 4, 8) if effect.remembers else count)
+    afresh = np.arange(len(draws)) % 2 == 1
+    for k, column in enumerate(columns):
+        if column in base.hypothesis.columns:
+            # What an effect did, the ground has taken on as far as it could: half begin at what was believed before.
+            draws[:, k] = np.where(
+                afresh & (column not in KEPT),
+                hypothesis.mean[k] if column in BENT else draws[:, k],
+                ground.coordinates[base.hypothesis.columns.index(column)],
+            )
+    if effect.touches is not None:
+        x, y, radius = (columns.index(column) for column in effect.touches)
+        draws = with_contacts(rng, draws, (x, y, radius), *contact_points(track, lacks))
+    if effect.pulls:
+        x, y, *at = (columns.index(name) for name in effect.pulls if name in columns)
+        point = (at[0], at[1]) if at else None
+        cord = columns.index(effect.cord) if effect.cord else None
+        draws = with_pulls(rng, draws, (x, y), point, cord, track, lacks)
+    if effect.rhythm is not None and effect.rhythm[0] in columns:
+        frequency, phase = (columns.index(name) for name in effect.rhythm)
+        draws = with_rhythms(rng, draws, frequency, phase, lacks, track.gyration)
+    return draws, afresh
+
+
+def _first_of(misfit: Array, among: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the rows of the least misfits among some."""
+    rows = np.flatnonzero(among)
+    return np.asarray(rows[np.argsort(misfit[rows], kind="stable")][:PARENTS], dtype=np.int64)
+
+
+def _best_of(
+    draws: Array, misfit: Array, among: NDArray[np.bool_], hypothesis: Hypothesis, options: DiagnoseOptions
+) -> Array:
+    """Return the best draws among some of them."""
+    order = np.argsort(misfit[among], kind="stable")
+    return apart(draws[among][order], hypothesis.spread, -(-options.candidates // 2))

@@ -1,0 +1,48 @@
+"""Where a hypothesis begins: an edge in time that few draws meet is found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch import DiagnoseOptions, track_of
+from pbrl_mismatch.data.cuts import cut_windows
+from pbrl_mismatch.search.fitted import cut_stages, fit_from
+from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
+from pbrl_mismatch.search.path.ground import ground_of
+from pbrl_mismatch.search.path.starts import starts_of
+
+OPTIONS = DiagnoseOptions()
+BIAS = np.array([0.4, 3.0, 0.2])
+"""Of the sensor, in its own axes [N, N, N m]."""
+ONSET = 1
+
+
+@pytest.fixture(scope="module")
+def clean(concealed_recording: Callable[..., Recording]) -> Any:
+    return track_of(concealed_recording("clean", 1), "table")
+
+
+def biased(clean: Any, since: float) -> Any:
+    """Return a track whose wrench has an offset from some moment on."""
+    return replace(clean, felt=clean.felt + BIAS * (clean.clock >= since)[:, None])
+
+
+@pytest.mark.parametrize("share", [0.23, 0.71])
+def test_the_moment_that_a_sensor_s_offset_comes_is_found(clean: Any, share: float) -> None:
+    since = float(clean.clock[0] + share * (clean.clock[-1] - clean.clock[0]))
+    track = biased(clean, since)
+    free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.02), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    base = fit_from(free, cut_stages(track, OPTIONS), free.mean[None], OPTIONS)
+    ground = ground_of(free, base.peak.coordinates[0], cut_windows(track, 2.0), OPTIONS.sensor_floor)
+    found = starts_of(np.random.default_rng(0), "wrench_bias", ONSET, base, ground, OPTIONS)
+    best = found.coordinates[int(np.argmax(found.evidence))]
+    told = dict(zip(found.hypothesis.columns, best, strict=True))
+    assert told["bias_start"] == pytest.approx(since, abs=0.25)
+    assert [told["bias_x"], told["bias_y"]] == pytest.approx(BIAS[:2].tolist(), abs=0.4)
+    assert found.noise_scale < 1.1
