@@ -13,6 +13,8 @@ from bullet_sim.scene import Scene
 from pbrl_bringup.concealed.stage import NAME
 
 GRAVITY = 9.81
+SPOT = 0.3
+"""A way over which tread is laid down [m] that is so long that a caster scrubs as on the spot at any speed."""
 
 
 def told_values(concealed: Mapping[str, Any], scene: Scene, grip: float = 0.0) -> dict[str, float]:
@@ -56,6 +58,8 @@ def _caster(told: Any, scene: Scene, mass: float) -> dict[str, float]:
         "caster_trail": make.trail,
         "caster_roll": make.rolling_resistance / make.radius,
         "caster_scrub": make.swivel_friction / make.trail / (mass * GRAVITY / 4.0),
+        "caster_twist": make.sliding_friction * make.contact_width / 4.0 / make.trail,
+        "caster_lay": make.scrub_length or SPOT,
     }
 
 

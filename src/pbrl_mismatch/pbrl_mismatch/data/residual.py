@@ -25,6 +25,8 @@ MEMORY = 0.4
 """Time in which a left-out wrench forgets itself [s]: a contact's, a border's; steady ones are no worse for it."""
 SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 """Sizes of the left-out force that are tried [N]."""
+SMALL = 1
+"""Which of them is tried first."""
 UNKNOWN_FORCE = 1e3
 """Where the felt wrench is missing, nothing is known of what is left out beside it [N]."""
 
@@ -96,8 +98,7 @@ def residual_wrench(
         if not (math.isfinite(value) and value > 0.0):
             raise MismatchError(f"residual: expected a {what} above zero, got {value}")
     if size is None:
-        likelihoods = [_smooth(track, row, each, memory, stride, back=False)[2] for each in SIZES]
-        size = SIZES[int(np.argmax(likelihoods))]
+        size = _likeliest_size(track, row, memory, stride)
     mean, spread, value = _smooth(track, row, size, memory, stride, back=True)
     unknown = in_missing(track.clock, track.missing, memory)
     mean[unknown, 6:] = 0.0
@@ -105,6 +106,22 @@ def residual_wrench(
     return ResidualWrench(
         track.clock, mean[:, :6], mean[:, 6:], spread[:, 6:, 6:], size, value, np.asarray(track.begin)
     )
+
+
+def _likeliest_size(track: Track, row: Array, memory: float, stride: int) -> float:
+    """Return the likeliest of `SIZES`, climbing from a small one: the likelihood has one top."""
+    found: dict[int, float] = {}
+
+    def likelihood(k: int) -> float:
+        if k not in found:
+            found[k] = _smooth(track, row, SIZES[k], memory, stride, back=False)[2]
+        return found[k]
+
+    best = SMALL
+    for way in (-1, 1):
+        while 0 <= best + way < len(SIZES) and likelihood(best + way) > likelihood(best):
+            best += way
+    return SIZES[best]
 
 
 def _smooth(

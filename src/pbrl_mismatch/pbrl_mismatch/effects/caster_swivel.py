@@ -10,7 +10,9 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
     return (
         positive("caster_trail", 0.03, 0.4),
         positive("caster_roll", 0.02, 0.9),
-        positive("caster_scrub", 0.02, 0.9),
+        positive("caster_scrub", 0.03, 0.9),
+        positive("caster_twist", 0.04, 0.9),
+        positive("caster_lay", 0.02, 1.0),
         plain("caster_heading", 0.0, 1.5),
     )
 
@@ -18,10 +20,12 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 EFFECT = Effect(
     name="caster_swivel",
     summary=(
-        "Trailing casters: the resistance points along each caster's heading, which follows the motion with a lag."
+        "Trailing casters: wheels roll along each caster's heading, which follows the motion with a lag; bearings and "
+        "treads resist its turn."
     ),
     equation=(
-        "heading' = (v x heading) / trail; F_i = -(m g / n) (mu_r sign(v_i . e) e + mu_s sign(v_i . e_perp) e_perp)"
+        "heading' = (e x v) / trail; F_i = -(m g / n) (mu_r sign(v . e) e + mu_t min(1, lay heading' / |v . e|) e_perp "
+        "+ mu_s sign(heading' - omega) e_perp at the wheel)"
     ),
     shows="Reversals: only then does the heading lag. Without them it is ground friction.",
     parameters=parameters,
@@ -30,12 +34,21 @@ EFFECT = Effect(
             "caster_trail",
             "caster_roll",
             "caster_scrub",
+            "caster_twist",
+            "caster_heading",
+        ),
+        (
+            "caster_trail",
+            "caster_roll",
+            "caster_scrub",
+            "caster_twist",
+            "caster_lay",
             "caster_heading",
         ),
     ),
     direction="velocity",
     angles=("caster_heading",),
-    linear=("caster_roll", "caster_scrub"),
+    linear=("caster_roll", "caster_scrub", "caster_twist"),
     remembers=True,
     sticks=True,
 )

@@ -77,6 +77,8 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("caster_trail", "m", 0.03),
     ("caster_roll", "1", 0.0),
     ("caster_scrub", "1", 0.0),
+    ("caster_twist", "1", 0.0),
+    ("caster_lay", "m", math.inf),
     ("caster_heading", "rad", 0.0),
     ("slosh_mass", "kg", 0.0),
     ("slosh_x", "m", 0.0),

@@ -204,10 +204,49 @@ def contacts(
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def on_casters(p: Array) -> bool:
+    """Tell whether the feet are casters."""
+    return p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0 or p[at.CASTER_TWIST] > 0.0
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def roll_on(
+    p: Array, heading: float, load: float, rx: float, ry: float, ux: float, uy: float, omega: float, acc: Array
+) -> None:
+    """Add what a trailing caster resists: the wheel's rolling, the tread's twist, and the bearing of the fork.
+
+    The wheel rolls, so that the fork turns by the pivot's speed across over the trail. The bearing rubs by how much
+    faster than the body that is: as if the body's point over the wheel were held across. The tread is twisted by the
+    turn itself, the less the more fresh tread is laid down meanwhile.
+
+    Args:
+        p: (WIDTH,) parameter row.
+        heading: of the caster, world axes [rad].
+        load: on it [N].
+        rx: lever of its pivot from the centre of mass [m].
+        ry: as `rx`.
+        ux: velocity of the pivot [m/s].
+        uy: as `ux`.
+        omega: of the body [rad/s].
+        acc: (9,) account.
+    """
+    ex, ey, trail = math.cos(heading), math.sin(heading), p[at.CASTER_TRAIL]
+    along, across = ux * ex + uy * ey, uy * ex - ux * ey
+    resist(acc, rx, ry, ex, ey, p[at.CASTER_ROLL] * load / math.sqrt(along * along + CREEP * CREEP))
+    if p[at.CASTER_SCRUB] > 0.0:
+        slip = across - trail * omega
+        k = p[at.CASTER_SCRUB] * load / math.sqrt(slip * slip + CREEP * CREEP)
+        resist(acc, rx - trail * ex, ry - trail * ey, -ey, ex, k)
+    if p[at.CASTER_TWIST] > 0.0:
+        slip = max(math.sqrt(across * across + CREEP * CREEP), abs(along) * trail / p[at.CASTER_LAY])
+        resist(acc, rx, ry, -ey, ex, p[at.CASTER_TWIST] * load / slip)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def dry(p: Array) -> bool:
     """Tell whether any dry friction of the effects is on: its limit depends on the velocity it leads to."""
-    floor = p[at.SLIDE_MU] + p[at.BREAKAWAY_MU] + abs(p[at.PATCH_MU]) + p[at.CASTER_ROLL] + p[at.CASTER_SCRUB]
-    return floor + p[at.WHEEL2_MU_X] + max(p[at.WHEEL2_MU_Y], 0.0) > 0.0
+    floor = p[at.SLIDE_MU] + p[at.BREAKAWAY_MU] + abs(p[at.PATCH_MU])
+    return on_casters(p) or floor + p[at.WHEEL2_MU_X] + max(p[at.WHEEL2_MU_Y], 0.0) > 0.0
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -296,7 +335,7 @@ def resistances(
     count = feet.shape[0]
     load = mass * GRAVITY / count
     slides = p[at.SLIDE_MU] > 0.0 or p[at.BREAKAWAY_MU] > 0.0
-    rolls = p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0
+    rolls = on_casters(p)
     if slides or rolls or p[at.PATCH_MU] != 0.0:
         even, ox, oy, gx, gy = load, 0.0, 0.0, 0.0, 0.0
         if p[at.LOAD_X] != 0.0 or p[at.LOAD_Y] != 0.0 or p[at.LOAD_HEIGHT] > 0.0:
@@ -316,12 +355,7 @@ def resistances(
             resist(acc, rx, ry, 1.0, 0.0, k)
             resist(acc, rx, ry, 0.0, 1.0, k)
             if rolls and i < CASTERS:
-                ex, ey = math.cos(state[FIRST_CASTER + i]), math.sin(state[FIRST_CASTER + i])
-                along, across = ux * ex + uy * ey, uy * ex - ux * ey
-                roll = p[at.CASTER_ROLL] * load / math.sqrt(along * along + CREEP * CREEP)
-                scrub = p[at.CASTER_SCRUB] * load / math.sqrt(across * across + CREEP * CREEP)
-                resist(acc, rx, ry, ex, ey, roll)
-                resist(acc, rx, ry, -ey, ex, scrub)
+                roll_on(p, state[FIRST_CASTER + i], load, rx, ry, ux, uy, omega, acc)
     weight = mass * GRAVITY
     if p[at.WHEEL2_MU_X] > 0.0 or p[at.WHEEL2_MU_Y] > 0.0:
         ax, ay = p[at.WHEEL2_X] - com[0], p[at.WHEEL2_Y] - com[1]

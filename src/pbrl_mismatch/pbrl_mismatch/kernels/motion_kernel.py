@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.contact_kernel import move_unseen
+from pbrl_mismatch.kernels.laws_kernel import on_casters
 from pbrl_mismatch.kernels.sense_kernel import acting, as_seen, load_now, to_truth
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH, STATE, UNSEEN
 from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body, swing_load, turn_casters
@@ -47,7 +48,7 @@ def rehearse_windows(
         memory: (W, STATE) whose columns past the sixth are written.
     """
     memory[:, FIRST_CASTER:] = 0.0
-    casters = p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0
+    casters = on_casters(p)
     swings, meets = p[at.SLOSH_MASS] > 0.0, p[at.UNSEEN_FORCE] > 0.0
     if not (casters or swings or meets):
         return

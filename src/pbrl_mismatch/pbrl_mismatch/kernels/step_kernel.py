@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.contact_kernel import move_unseen
-from pbrl_mismatch.kernels.laws_kernel import CREEP, contacts, dry, resistances, springs, swivel
+from pbrl_mismatch.kernels.laws_kernel import CREEP, contacts, dry, on_casters, resistances, springs, swivel
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
 from pbrl_model.kernel import ERROR_BIAS, GRAVITY, SINGULAR, box_impulses, cos_sin, joint_rows
 
@@ -249,7 +249,7 @@ def remember(
     """Move what else there is in a body by `dt` [s]: a load by the body's acceleration, casters by its velocity."""
     if p[at.SLOSH_MASS] > 0.0:
         swing_load(p, state, ax, ay, turned, c, s, com, dt)
-    if p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0:
+    if on_casters(p):
         turn_casters(p, state, c, s, com, feet, dt)
 
 

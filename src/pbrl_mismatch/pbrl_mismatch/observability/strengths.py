@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 STRENGTHS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "second_wheel": ("wheel2_mu_x", "wheel2_mu_y"),
-        "caster_swivel": ("caster_roll", "caster_scrub"),
+        "caster_swivel": ("caster_roll", "caster_scrub", "caster_twist"),
         "ground_friction": ("slide_mu",),
         "breakaway_friction": ("breakaway_mu",),
         "viscous_drag": ("drag_linear", "drag_turn"),

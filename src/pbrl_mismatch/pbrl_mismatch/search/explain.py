@@ -39,6 +39,8 @@ LEADS = 3
 """So many of the likeliest effects lead a baseline to where they have the body's own parameters."""
 LED = 100.0
 """Kinds of baseline that are worse than the best by more [nat] are not led: no other top would do."""
+FREEDOM = 1.0
+"""An effect that says nothing is less likely than the baseline by about so much at least, for its freedom [nat]."""
 NEAR_THE_FLOOR = 1.1
 """A hypothesis that needs less than this scale of the noise leaves nothing worth another effect."""
 WORTH_A_KIND = 3.0
@@ -127,7 +129,8 @@ def _reached(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: 
     for base in bases:
         found = base
         for each in likely if base.evidence > best - LED else []:
-            found = _climbed_on(found, each, stages, options)
+            # One that is no likelier for all its freedom has found no better top.
+            found = _climbed_on(found, each, stages, options) if each.evidence > found.evidence - FREEDOM else found
         climbed.append(found)
     return sorted(climbed, key=_lowest)
 
@@ -145,7 +148,8 @@ def _polished(
     explains much too, has found them.
     """
     best = next((each.fitted for each in weighed if each.effects and GRASP_COMPLIANCE not in each.effects), None)
-    if best is None:
+    none = max((each.fitted.evidence for each in weighed if not each.effects), default=-math.inf)
+    if best is None or best.evidence < none - FREEDOM:
         return tried
     names = [each.effects for each in weighed if each.effects][:POLISHED]
     chosen = {id(each.fitted) for each in weighed if each.effects in names}

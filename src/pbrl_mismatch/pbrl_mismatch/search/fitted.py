@@ -19,7 +19,7 @@ from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.along import lay_along
 from pbrl_mismatch.search.path.climb import climb_along
-from pbrl_mismatch.search.path.ground import MIDDLING, Traced, traced_score
+from pbrl_mismatch.search.path.ground import FINE, Traced, traced_score
 from pbrl_model.fitting.guesses import axle, circle, pivot
 
 Array = NDArray[np.float64]
@@ -204,7 +204,7 @@ def fit_baseline(
         if "wheel_theta" in columns:
             starts[3:6, columns.index("wheel_theta")] = angle
     mass = float(hypothesis.base[COLUMN["mass"]])
-    along = lay_along(cut_windows(track, max(options.windows)), track.seen, mass, options.sensor_floor, MIDDLING)
+    along = lay_along(cut_windows(track, max(options.windows)), track.seen, mass, options.sensor_floor, FINE)
     found = climb_along(along, hypothesis, starts, BASELINE_STEPS)
     order = np.argsort(-found.evidence, kind="stable")
     starts = apart(found.coordinates[order], hypothesis.spread, KEPT_OF_BASELINE)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
-from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
 from pbrl_mismatch.search.path.along import Along, as_seen_path, lay_along
@@ -18,8 +17,8 @@ from pbrl_mismatch.search.path.climb import climb_along, weights
 
 Array = NDArray[np.float64]
 
-COARSE, MIDDLING, FINE = 8, 4, 2
-"""Steps between accelerations: for a first look, for a climb, and where more moves than the body."""
+COARSE, FINE = 8, 4
+"""Steps between accelerations: for a first look, and for a climb or where more moves than the body."""
 ITERATIONS = 5
 
 
@@ -73,8 +72,8 @@ class Ground:
 
     @cached_property
     def climbed(self) -> Along:
-        """Return the windows that bodies without a memory are climbed along."""
-        return self.along(MIDDLING)
+        """Return the windows that are climbed along."""
+        return self.along(FINE)
 
     @cached_property
     def first(self) -> Look:
@@ -84,7 +83,7 @@ class Ground:
     @cached_property
     def fine(self) -> Look:
         """Return the same in small steps."""
-        return self._look(self.along(FINE))
+        return self._look(self.climbed)
 
     def _look(self, along: Along) -> Look:
         steps = step_sizes(self.hypothesis)
@@ -141,8 +140,7 @@ def traced(hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float) -> T
     """
     row = hypothesis.rows(starts[:1])[0]
     lacks = residual_wrench(cuts.track, row)
-    remembers = any(EFFECTS[name].remembers for name in hypothesis.effects)
-    along = laid(cuts, row, lacks, floor, FINE if remembers else MIDDLING)
+    along = laid(cuts, row, lacks, floor, FINE)
     found = climb_along(along, hypothesis, starts, ITERATIONS)
     best = int(np.argmax(found.evidence))
     scale = float(np.sqrt(max(1.0, found.misfit[best].sum() / along.counts.sum())))

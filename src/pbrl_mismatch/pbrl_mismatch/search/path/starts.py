@@ -59,10 +59,9 @@ def starts_of(
         afresh = np.concatenate([afresh, afresh[parents]])
     halves = [half for half in (~afresh, afresh) if half.any()]
     starts = np.concatenate([_best_of(ranked, misfit, half, hypothesis, options) for half in halves])
-    along = ground.fine.along if effect.remembers else ground.climbed
-    begun = climb_along(along if effect.remembers else ground.first.along, hypothesis, starts, BEGUN)
+    begun = climb_along(ground.climbed if effect.remembers else ground.first.along, hypothesis, starts, BEGUN)
     best = begun.coordinates[np.argsort(-begun.evidence, kind="stable")]
-    return climb_along(along, hypothesis, apart(best, hypothesis.spread, options.keep[0]), CLIMBED)
+    return climb_along(ground.climbed, hypothesis, apart(best, hypothesis.spread, options.keep[0]), CLIMBED)
 
 
 def _searched(effect: Effect, variant: int) -> list[str]:
