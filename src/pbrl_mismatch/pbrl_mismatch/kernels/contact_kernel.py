@@ -1,4 +1,4 @@
-"""Compiled: where a footprint meets a disc, and a body that is pushed along by it."""
+"""Compiled: where a footprint meets a disc, what holds it there or at a pivot, and a body that it pushes along."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
+from pbrl_mismatch.kernels.account_kernel import CREEP, SETTLING, push, resist
 from pbrl_mismatch.kernels.state import UNSEEN
 
 Array = NDArray[np.float64]
@@ -62,3 +63,60 @@ def move_unseen(p: Array, outline: Array, state: Array, c: float, s: float, com:
     if slid > 0.0:
         state[UNSEEN] += slid * nx
         state[UNSEEN + 1] += slid * ny
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def contacts(
+    p: Array,
+    state: Array,
+    c: float,
+    s: float,
+    mass: float,
+    com: Array,
+    pivot: Array,
+    outline: Array,
+    dt: float,
+    acc: Array,
+) -> None:
+    """Add what is too stiff to be seen in a pose, pivots and contacts; for what is not named see `laws_kernel.springs`.
+
+    Args:
+        p: see `laws_kernel.springs`.
+        state: see `laws_kernel.springs`.
+        c: see `laws_kernel.springs`.
+        s: see `laws_kernel.springs`.
+        mass: see `laws_kernel.springs`.
+        com: see `laws_kernel.springs`.
+        pivot: (3,) pose of the body's frame when the episode began, which a hidden hinge holds on to.
+        outline: (E, 2) footprint, counter-clockwise.
+        dt: in which they answer [s].
+        acc: (9,) account.
+    """
+    if p[at.PIVOT_STIFFNESS] > 0.0:
+        k, c0, s0 = p[at.PIVOT_STIFFNESS], math.cos(pivot[2]), math.sin(pivot[2])
+        dx, dy = p[at.PIVOT_X] - pivot[0], p[at.PIVOT_Y] - pivot[1]
+        ax, ay = c0 * dx + s0 * dy - com[0], -s0 * dx + c0 * dy - com[1]
+        rx, ry = c * ax - s * ay, s * ax + c * ay
+        push(acc, rx, ry, k * (p[at.PIVOT_X] - state[0] - rx), k * (p[at.PIVOT_Y] - state[1] - ry))
+        give = k * dt + 2.0 * p[at.PIVOT_DAMPING] * math.sqrt(k * mass)
+        resist(acc, rx, ry, 1.0, 0.0, give)
+        resist(acc, rx, ry, 0.0, 1.0, give)
+    if p[at.OBSTACLE_STIFFNESS] > 0.0:
+        found = contact(p, outline, state, c, s, com, p[at.OBSTACLE_X], p[at.OBSTACLE_Y], p[at.OBSTACLE_RADIUS])
+        depth, rx, ry, nx, ny = found
+        if depth > 0.0:
+            k = p[at.OBSTACLE_STIFFNESS]
+            push(acc, rx, ry, -k * depth * nx, -k * depth * ny)
+            resist(acc, rx, ry, nx, ny, k * (dt + SETTLING))
+            if p[at.OBSTACLE_FRICTION] > 0.0:
+                slip = (state[4] + state[5] * rx) * nx - (state[3] - state[5] * ry) * ny
+                grip = p[at.OBSTACLE_FRICTION] * k * depth / math.sqrt(slip * slip + CREEP * CREEP)
+                resist(acc, rx, ry, -ny, nx, grip)
+    if p[at.UNSEEN_FORCE] > 0.0:
+        found = contact(p, outline, state, c, s, com, state[UNSEEN], state[UNSEEN + 1], p[at.UNSEEN_RADIUS])
+        depth, rx, ry, nx, ny = found
+        if depth > 0.0:
+            force = min(UNSEEN_STIFFNESS * depth, p[at.UNSEEN_FORCE])
+            push(acc, rx, ry, -force * nx, -force * ny)
+            if force < 0.999 * p[at.UNSEEN_FORCE]:
+                resist(acc, rx, ry, nx, ny, UNSEEN_STIFFNESS * (dt + SETTLING))

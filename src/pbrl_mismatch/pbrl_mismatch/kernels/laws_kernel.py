@@ -1,9 +1,6 @@
 """Compiled: what every effect does to a body at one moment, as forces and as resistances.
 
-A law adds to an account `acc` (9,): force and torque (0..2) at the centre of mass in world axes, and the upper
-triangle xx, xy, yy, xt, yt, tt (3..8) of a matrix D of resistances, so that the wrench is acc[:3] - D (vx, vy, omega).
-Resistances are solved for implicitly, which keeps stiff springs and dry friction steady at any step: a spring adds
-its stiffness times dt, dry friction its limit over the sliding speed, taken from the iteration before.
+Laws write into an account, see `account_kernel`; those of contacts are in `contact_kernel`.
 """
 
 from __future__ import annotations
@@ -15,40 +12,16 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.contact_kernel import UNSEEN_STIFFNESS, contact
-from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH, UNSEEN
+from pbrl_mismatch.kernels.account_kernel import CREEP, SETTLING, push, resist
+from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
 from pbrl_model.kernel import GRAVITY
 
 Array = NDArray[np.float64]
 
-CREEP = 1e-3
-"""Dry friction is viscous below this sliding speed [m/s]."""
 BORDER = 0.01
 """A patch's border is so soft [m]: a foot has a width, and a fit needs a slope."""
 SWITCHING = 0.1
 """What begins at some moment comes on within this time [s]: a fit needs a slope."""
-SETTLING = 0.02
-"""Time in which a contact's or a cord's oscillation is damped [s]: damping over stiffness."""
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def push(acc: Array, rx: float, ry: float, fx: float, fy: float) -> None:
-    """Add a force (fx, fy) [N] at the lever (rx, ry) [m]."""
-    acc[0] += fx
-    acc[1] += fy
-    acc[2] += rx * fy - ry * fx
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def resist(acc: Array, rx: float, ry: float, nx: float, ny: float, k: float) -> None:
-    """Add a resistance k [N s/m] to the motion of the lever's end along the direction (nx, ny)."""
-    lever = rx * ny - ry * nx
-    acc[3] += k * nx * nx
-    acc[4] += k * nx * ny
-    acc[5] += k * ny * ny
-    acc[6] += k * nx * lever
-    acc[7] += k * ny * lever
-    acc[8] += k * lever * lever
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -144,63 +117,6 @@ def springs(
         ax, ay = p[at.SLOSH_X] - com[0], p[at.SLOSH_Y] - com[1]
         fx, fy = k * state[SLOSH] + d * state[SLOSH + 2], k * state[SLOSH + 1] + d * state[SLOSH + 3]
         push(acc, c * ax - s * ay, s * ax + c * ay, fx, fy)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def contacts(
-    p: Array,
-    state: Array,
-    c: float,
-    s: float,
-    mass: float,
-    com: Array,
-    pivot: Array,
-    outline: Array,
-    dt: float,
-    acc: Array,
-) -> None:
-    """Add what is too stiff to be seen in a pose: pivots and contacts. See `springs` for what is not named here.
-
-    Args:
-        p: see `springs`.
-        state: see `springs`.
-        c: see `springs`.
-        s: see `springs`.
-        mass: see `springs`.
-        com: see `springs`.
-        pivot: (3,) pose of the body's frame when the episode began, which a hidden hinge holds on to.
-        outline: (E, 2) footprint, counter-clockwise.
-        dt: in which they answer [s].
-        acc: (9,) account.
-    """
-    if p[at.PIVOT_STIFFNESS] > 0.0:
-        k, c0, s0 = p[at.PIVOT_STIFFNESS], math.cos(pivot[2]), math.sin(pivot[2])
-        dx, dy = p[at.PIVOT_X] - pivot[0], p[at.PIVOT_Y] - pivot[1]
-        ax, ay = c0 * dx + s0 * dy - com[0], -s0 * dx + c0 * dy - com[1]
-        rx, ry = c * ax - s * ay, s * ax + c * ay
-        push(acc, rx, ry, k * (p[at.PIVOT_X] - state[0] - rx), k * (p[at.PIVOT_Y] - state[1] - ry))
-        give = k * dt + 2.0 * p[at.PIVOT_DAMPING] * math.sqrt(k * mass)
-        resist(acc, rx, ry, 1.0, 0.0, give)
-        resist(acc, rx, ry, 0.0, 1.0, give)
-    if p[at.OBSTACLE_STIFFNESS] > 0.0:
-        found = contact(p, outline, state, c, s, com, p[at.OBSTACLE_X], p[at.OBSTACLE_Y], p[at.OBSTACLE_RADIUS])
-        depth, rx, ry, nx, ny = found
-        if depth > 0.0:
-            k = p[at.OBSTACLE_STIFFNESS]
-            push(acc, rx, ry, -k * depth * nx, -k * depth * ny)
-            resist(acc, rx, ry, nx, ny, k * (dt + SETTLING))
-            if p[at.OBSTACLE_FRICTION] > 0.0:
-                slip = (state[4] + state[5] * rx) * nx - (state[3] - state[5] * ry) * ny
-                grip = p[at.OBSTACLE_FRICTION] * k * depth / math.sqrt(slip * slip + CREEP * CREEP)
-                resist(acc, rx, ry, -ny, nx, grip)
-    if p[at.UNSEEN_FORCE] > 0.0:
-        found = contact(p, outline, state, c, s, com, state[UNSEEN], state[UNSEEN + 1], p[at.UNSEEN_RADIUS])
-        depth, rx, ry, nx, ny = found
-        if depth > 0.0:
-            force = min(UNSEEN_STIFFNESS * depth, p[at.UNSEEN_FORCE])
-            push(acc, rx, ry, -force * nx, -force * ny)
-            if force < 0.999 * p[at.UNSEEN_FORCE]:
-                resist(acc, rx, ry, nx, ny, UNSEEN_STIFFNESS * (dt + SETTLING))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -7,8 +7,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.contact_kernel import move_unseen
-from pbrl_mismatch.kernels.laws_kernel import contacts, springs
+from pbrl_mismatch.kernels.contact_kernel import contacts, move_unseen
+from pbrl_mismatch.kernels.laws_kernel import springs
 from pbrl_mismatch.kernels.motion_kernel import BEGIN, LAST, rehearse
 from pbrl_mismatch.kernels.sense_kernel import acting, load_now, to_truth
 from pbrl_mismatch.kernels.state import STATE

@@ -14,8 +14,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.contact_kernel import move_unseen
-from pbrl_mismatch.kernels.laws_kernel import CREEP, contacts, dry, on_casters, resistances, springs, swivel
+from pbrl_mismatch.kernels.account_kernel import CREEP
+from pbrl_mismatch.kernels.contact_kernel import contacts, move_unseen
+from pbrl_mismatch.kernels.laws_kernel import dry, on_casters, resistances, springs, swivel
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
 from pbrl_model.kernel import ERROR_BIAS, GRAVITY, SINGULAR, box_impulses, cos_sin, joint_rows
 
