@@ -82,7 +82,8 @@ class Objective:
     def _residual(self, found: Array) -> Array:
         difference = self.cuts.pose - found
         difference[..., 2] -= 2 * np.pi * np.round(difference[..., 2] / (2 * np.pi))
-        bounded = np.nan_to_num(difference * self.cuts.weight, nan=1e6, posinf=1e6, neginf=-1e6)
+        with np.errstate(invalid="ignore"):  # a law that runs away is cut off below
+            bounded = np.nan_to_num(difference * self.cuts.weight, nan=1e6, posinf=1e6, neginf=-1e6)
         return np.clip(bounded, -1e6, 1e6).reshape(len(found), len(self.cuts), -1)
 
     def residual(self, coordinates: Array, nuisance: Array) -> Array:
@@ -145,7 +146,8 @@ class Objective:
             [self._simulated(rows[a : a + size], flat_z[a : a + size]) for a in range(0, len(rows), size)]
         ).reshape(count, moves, *self.cuts.pose.shape)
         residual = self._residual(found[:, 0])
-        change = (found[:, 1:] - found[:, :1]) * self.cuts.weight
+        with np.errstate(invalid="ignore"):
+            change = (found[:, 1:] - found[:, :1]) * self.cuts.weight
         change = np.clip(np.nan_to_num(change), -1e5, 1e5).reshape(count, moves - 1, len(self.cuts), -1)
         change /= np.concatenate([steps, nuisance_steps[:loose]])[:, None, None]
         change = np.moveaxis(change, 1, -1)
