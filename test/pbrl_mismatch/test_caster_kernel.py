@@ -1,0 +1,44 @@
+"""What one trailing caster resists, against a wheel that rolls."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
+from pbrl_mismatch.kernels.laws_kernel import roll_on
+
+
+def test_a_caster_s_bearing_rubs_by_how_much_faster_than_the_body_its_fork_turns() -> None:
+    # A body that turns about a point takes trailing forks along: their bearings do not move.
+    row, acc, omega, trail = neutral_row(), np.zeros(9), 0.4, 0.03
+    row[[COLUMN["caster_trail"], COLUMN["caster_scrub"]]] = trail, 0.05
+    pivot, centre = np.array([0.3, -0.2]), np.array([1.1, 0.4])
+    velocity = omega * np.array([-(pivot - centre)[1], (pivot - centre)[0]])
+    # The wheel rolls where its axle points to the centre of the turn.
+    angle = math.asin(trail * omega / math.hypot(*velocity))
+    heading = math.atan2(velocity[1], velocity[0]) - angle
+    twist = np.array([*(velocity - omega * np.array([-pivot[1], pivot[0]])), omega])
+    roll_on(row, heading, 100.0, *pivot, *velocity, omega, acc)
+    np.testing.assert_allclose(matrix_of(acc) @ twist, 0.0, atol=1e-9)
+    acc[:] = 0.0
+    roll_on(row, heading + 0.5, 100.0, *pivot, *velocity, omega, acc)
+    assert np.hypot(*(matrix_of(acc) @ twist)[:2]) == pytest.approx(5.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("angle", "share"), [(1.2, 1.0), (0.3, 0.5 * math.tan(0.3))])
+def test_a_tread_that_rolls_while_it_turns_is_twisted_less(angle: float, share: float) -> None:
+    row, acc = neutral_row(), np.zeros(9)
+    row[[COLUMN["caster_trail"], COLUMN["caster_twist"], COLUMN["caster_lay"]]] = 0.03, 0.05, 0.015
+    velocity = 0.2 * np.array([math.cos(angle), math.sin(angle)])
+    roll_on(row, 0.0, 100.0, 0.3, -0.2, *velocity, 0.0, acc)
+    force = matrix_of(acc) @ np.array([*velocity, 0.0])
+    np.testing.assert_allclose(force[:2], [0.0, 5.0 * min(share, 1.0)], atol=1e-2)
+
+
+def matrix_of(acc: np.ndarray) -> np.ndarray:
+    """Return the resistances of an account."""
+    xx, xy, yy, xt, yt, tt = acc[3:]
+    return np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
