@@ -31,7 +31,8 @@ class DiagnoseOptions(BaseModel):
         block: length of what is held out at a time [s].
         every: one block of so many is held out.
         draws: of an effect's prior for each three of its parameters that are not solved for, compared with what is
-            lacking along the recorded path; a quarter of them where more moves than the body.
+            lacking along the recorded path; a quarter of them where more moves than the body. As many again are drawn
+            about the best.
         candidates: how many of those are climbed from along the path.
         shortlist: effects at most that go on from the path to simulated windows, by evidence.
         keep: from how many points an effect is climbed over windows of each length.

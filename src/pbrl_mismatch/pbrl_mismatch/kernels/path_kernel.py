@@ -58,7 +58,7 @@ def accelerate_along(
         body: (4,).
         outline: (E, 2).
         feet: (F, 2).
-        stride: every so many steps; 1 for models in which more moves than the body.
+        stride: every so many steps; what moves besides the body goes on by so much at a time.
         out: (P, ceil(T / stride), 3) [m/s^2, m/s^2, rad/s^2], written.
     """
     state, com, acc, wrench = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3)
