@@ -161,6 +161,8 @@ def test_bad_input_is_refused_in_one_line(dragged: Recording) -> None:
         {"iterations": (3, 5, 8)},
         {"most_together": 4},
         {"models": 3},
+        {"grasp_spread": -0.1},
+        {"outline_spread": float("nan")},
         {"baseline": ()},
     ],
 )

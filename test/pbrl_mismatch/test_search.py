@@ -167,3 +167,18 @@ def test_a_delay_that_nobody_would_believe_is_a_mismatch(track: Any, free: Any) 
     truth = free.mean[None] + [[0.0, 0.0, 0.1]]
     fit = climb(Objective(free, drawn(rng, cuts, free.rows(truth)[0]), FLOOR), free.mean[None], iterations=12)
     assert predictive_test(fit, 0).p_value < 1e-6
+
+
+def test_what_is_told_roughly_is_a_mismatch_only_to_who_was_told_otherwise(track: Any, free: Any) -> None:
+    rng, cuts = np.random.default_rng(7), cut_windows(track, 2.0)
+    told = BaselineOptions(20.0, 0.1, 0.1, 0.005, grasp_spread=0.1, outline_spread=0.02)
+    rough = baselines(told, ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    assert rough.columns == (*free.columns, "sensor_turn", "com_x", "com_y")
+    truth = rough.mean[None] + [[0.0, 0.0, 0.0, 0.12, -0.015, 0.01]]
+    data = drawn(rng, cuts, rough.rows(truth)[0])
+    known = climb(Objective(rough, data, FLOOR), rough.mean[None], iterations=12)
+    off = (known.coordinates[0] - truth[0]) / np.sqrt(np.diag(known.covariance(0)))
+    assert np.abs(off).max() < 3.5
+    assert predictive_test(known, 0).p_value > 1e-3
+    surprised = climb(Objective(free, data, FLOOR), free.mean[None], iterations=12)
+    assert predictive_test(surprised, 0).p_value < 1e-6

@@ -161,6 +161,14 @@ def diagnose(
         float | None,
         typer.Option(help="How well the mass that was told is known: 0.2 is to 20 %. Default: 0.1."),
     ] = None,
+    grasp_spread: Annotated[
+        float | None,
+        typer.Option(help="How well the gripper's direction is known [rad]. Default: 0, exactly."),
+    ] = None,
+    outline_spread: Annotated[
+        float | None,
+        typer.Option(help="How well each side of the outline is known [m]. Default: 0, exactly."),
+    ] = None,
     seed: Seed = 0,
     workers: Annotated[
         int, typer.Option(min=1, max=256, help="Threads; the result does not depend on their number.")
@@ -174,7 +182,7 @@ def diagnose(
         out=out,
         baseline=baseline or [],
         without=without or [],
-        mass_spread=mass_spread,
+        known={"mass_spread": mass_spread, "grasp_spread": grasp_spread, "outline_spread": outline_spread},
         seed=seed,
         workers=workers,
     )

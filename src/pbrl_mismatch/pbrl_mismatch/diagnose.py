@@ -182,6 +182,8 @@ def fit_baselines(
         options.mass_spread if known else UNKNOWN_MASS_SPREAD,
         options.inertia_spread,
         options.delay_spread,
+        options.grasp_spread,
+        options.outline_spread,
     )
     hinge = hinge_guess(track) if "hinge" in options.baseline else None
     if "hinge" in options.baseline and hinge is None:

@@ -13,6 +13,7 @@ from pbrl_model.parameters import nearest
 
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 KINDS = ("free", "caster", "wheel", "ground", "wheel+ground", "hinge")
 
 
@@ -42,6 +43,10 @@ class DiagnoseOptions(BaseModel):
         mass_spread: how well the nominal mass is known, as a standard deviation of its logarithm.
         inertia_spread: the same of the inertia that the footprint suggests.
         delay_spread: delay of poses that is no fault [s].
+        grasp_spread: how well the direction of a grasp is known, and with it the wrench's, as a standard deviation
+            [rad]; 0: exactly.
+        outline_spread: how well each side of the footprint is known, and with it where the middle is, as a standard
+            deviation [m]; 0: exactly.
         none_odds: prior odds that nothing was left out against any effect.
         most_together: effects at most that are sought together.
         workers: threads of the search; the bytes do not depend on it.
@@ -71,6 +76,8 @@ class DiagnoseOptions(BaseModel):
     mass_spread: Positive = 0.1
     inertia_spread: Positive = 0.1
     delay_spread: Positive = 0.02
+    grasp_spread: NotNegative = 0.0
+    outline_spread: NotNegative = 0.0
     none_odds: Positive = 1.0
     most_together: Annotated[int, Field(ge=1, le=3)] = 2
     workers: Annotated[int, Field(ge=1, le=256)] = 2

@@ -16,9 +16,9 @@ from pbrl_bringup.concealed.draws import DRAWS
 from pbrl_bringup.concealed.furnished import PART_OF_IT
 from pbrl_bringup.concealed.sets import (
     FIRST_SEED,
-    MASS_OFF,
     OUTLINE_OFF,
     QUICK_EFFECTS,
+    ROUGHLY,
     SETS,
     SPARE_STEP,
     SPARES,
@@ -89,7 +89,7 @@ def test_a_folder_s_name_says_nothing_of_what_is_concealed() -> None:
     assert {str(each.options) for each in trials if each.set in ("clean", "single", "pairs", "furnished")} == {"{}"}
     withheld = next(each for each in trials if each.set == "withheld")
     assert withheld.options == {"without": list(withheld.withheld)}
-    assert next(each for each in trials if each.set == "rough").options == {"mass_spread": MASS_OFF}
+    assert next(each for each in trials if each.set == "rough").options == ROUGHLY
 
 
 def test_a_quick_run_is_small_and_sets_can_be_chosen() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,21 @@ def command(
     out: Path,
     baseline: list[str],
     without: list[str],
-    mass_spread: float | None,
+    known: Mapping[str, float | None],
     seed: int,
     workers: int,
 ) -> int:
     """Diagnose every object of a recording.
+
+    Args:
+        bag: recording.
+        mapping: of its topics; None: ours.
+        out: folder for the results.
+        baseline: kinds of body, and models' files.
+        without: effects that the library does without.
+        known: how well things are known, by option; None: the default.
+        seed: of every draw.
+        workers: threads.
 
     Raises:
         BagError: the recording cannot be read or is malformed.
@@ -44,7 +55,7 @@ def command(
     kinds = tuple(each for each in baseline if not is_model_file(each))
     asked: dict[str, Any] = {"baseline": kinds} if kinds else {}
     asked["models"] = tuple(Path(each) for each in baseline if is_model_file(each))
-    asked |= {} if mass_spread is None else {"mass_spread": mass_spread}
+    asked |= {name: value for name, value in known.items() if value is not None}
     options = DiagnoseOptions(without=tuple(without), seed=seed, workers=workers, **asked)
     recording = read_recording(bag, mapping)
     for note in recording.notes:

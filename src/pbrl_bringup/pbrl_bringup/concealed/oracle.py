@@ -19,14 +19,17 @@ from scipy.stats import chi2, ncx2
 
 from pbrl_bag.types import Recording
 from pbrl_bringup.concealed.truth import Truth
+from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.grip import lay_grips
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.diagnose import fit_baselines, track_of
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
+from pbrl_mismatch.search.explain import led
 from pbrl_mismatch.search.fitted import Fitted, Stages, cut_stages, fit_from, judged, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way, grip_evidence
 from pbrl_mismatch.search.hypothesis import BaselineOptions, Hypothesis, baselines
+from pbrl_mismatch.search.library import trace
 from pbrl_mismatch.search.told_baseline import ToldBaseline
 
 Array = NDArray[np.float64]
@@ -123,16 +126,33 @@ def oracle(laid: Laid, truth: Truth) -> Oracle:
         laid: the recording.
         truth: what was concealed; effects that act through the body's motion.
     """
+    bases = _bases(laid)
+    best = _best_told(laid, truth, bases)
+    # A baseline that had not found its best would make what was concealed look stronger than it is.
+    bases = led(bases, [best], laid.stages, laid.options)
+    longest = cut_windows(laid.track, max(laid.options.windows))
+    best, *bases = (trace(longest, laid.options, each, each.peak.coordinates) for each in (best, *bases))
+    bases = sorted(bases, key=lambda each: -each.evidence)
+    return Oracle(judged(best, laid.stages, laid.options), judged(bases[0], laid.stages, laid.options, even=True))
+
+
+def _bases(laid: Laid) -> list[Fitted]:
     rng = np.random.default_rng(laid.options.seed)
     bases = fit_baselines(rng, laid.track, laid.stages, laid.options, laid.baseline)
-    bases = [beside_motion(each, laid.grip) for each in bases]
+    return [beside_motion(each, laid.grip) for each in bases]
+
+
+def _best_told(laid: Laid, truth: Truth, bases: list[Fitted]) -> Fitted:
+    """Return the likeliest told fit on the bases of the true kind."""
     true = [each for each in bases if laid.baseline is not None or each.hypothesis.variant == _kind(truth)]
-    best = max((_told(laid, truth, each, STARTS) for each in true), key=lambda each: each.evidence)
-    return Oracle(judged(best, laid.stages, laid.options), judged(bases[0], laid.stages, laid.options, even=True))
+    return max((_told(laid, truth, each, STARTS) for each in true), key=lambda each: each.evidence)
 
 
 def seen(laid: Laid, truth: Truth) -> Oracle | None:
     """Return the oracle if what was concealed is at least what it detects in 95 % of recordings, else nothing.
+
+    It has to be likelier than nothing left out, too: a wheel that no hand makes slide is as good as a pin. Of several
+    effects each has to be, beside an oracle that is told the others: what cannot be seen cannot be named.
 
     Most draws that are too weak are so by far. They are told by one climb from the truth with the effects and one
     without: what keeps the baseline from better optima makes the effects look stronger, never weaker.
@@ -140,7 +160,16 @@ def seen(laid: Laid, truth: Truth) -> Oracle | None:
     if _glance(laid, truth).times_detectable < HOPELESS:
         return None
     found = oracle(laid, truth)
-    return found if found.times_detectable >= 1.0 else None
+    if found.times_detectable < 1.0 or found.gain < 0.0:
+        return None
+    return found if len(truth.effects) < 2 or _each_seen(laid, truth, found) else None
+
+
+def _each_seen(laid: Laid, truth: Truth, found: Oracle) -> bool:
+    """Tell whether each of several effects is detected beside the others."""
+    bases = _bases(laid)
+    rests = [replace(truth, effects=tuple(o for o in truth.effects if o != name)) for name in truth.effects]
+    return all(Oracle(found.fitted, _best_told(laid, rest, bases)).times_detectable >= 1.0 for rest in rests)
 
 
 def _glance(laid: Laid, truth: Truth) -> Oracle:

@@ -52,6 +52,8 @@ QUICK_SETS, QUICK_CLEAN, QUICK_EFFECTS = ("clean", "single"), 2, ("payload_chang
 MASS_OFF, TURN_OFF, OUTLINE_OFF = 0.2, 0.1, 0.02
 """What is told wrongly in "rough": mass (of its logarithm), grasp direction [rad], as standard deviations; sides of the
 outline at most [m]."""
+ROUGHLY = {"mass_spread": MASS_OFF, "grasp_spread": TURN_OFF, "outline_spread": OUTLINE_OFF / math.sqrt(3.0)}
+"""The same as a diagnosis is told it, all as standard deviations."""
 APART = (
     frozenset({"ground_friction", "breakaway_friction", "caster_swivel"}),
     frozenset({"hidden_hinge", "hidden_obstacle", "unseen_body", "detent", "floor_patch", "tether"}),
@@ -88,7 +90,7 @@ class Trial:
     @property
     def options(self) -> dict[str, Any]:
         """Return the settings of its diagnosis, by name in `DiagnoseOptions`."""
-        told: dict[str, Any] = {"mass_spread": MASS_OFF} if self.set == "rough" else {}
+        told: dict[str, Any] = ROUGHLY if self.set == "rough" else {}
         return told | ({"without": list(self.withheld)} if self.withheld else {})
 
 

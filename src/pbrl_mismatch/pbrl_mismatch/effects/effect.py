@@ -72,7 +72,7 @@ class Scene:
         reach: (2,) half the sides of the swept floor's bounding box [m].
         centroid: (2,) of the footprint in the body's frame [m].
         half: (2,) half the sides of the footprint's bounding box [m].
-        mass: of the body as the baseline has it [kg].
+        mass: of the body as it was told, or else as the baseline has it [kg].
         force: root mean square of the force felt [N].
         speed: root mean square speed while it moved [m/s].
         start: of the recording [s].
@@ -124,6 +124,8 @@ class Effect:
         pulls: columns x and y of a place in the world, then of the point of the body that is drawn to it.
         cord: column of the length below which nothing pulls.
         rhythm: columns of a frequency and of its phase.
+        region: columns of a rectangle on the floor in which feet are held: x, y, half of length and width, and angle.
+        pins: columns x and y of a place about which the body can only turn.
         remembers: whether more moves than the body, so that its past matters.
         sticks: whether it is dry friction, which a body at rest does not show the strength of.
     """
@@ -144,6 +146,8 @@ class Effect:
     pulls: tuple[str, ...] = ()
     cord: str | None = None
     rhythm: tuple[str, str] | None = None
+    region: tuple[str, str, str, str, str] | None = None
+    pins: tuple[str, str] | None = None
     remembers: bool = False
     sticks: bool = False
 

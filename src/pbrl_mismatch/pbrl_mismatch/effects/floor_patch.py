@@ -55,5 +55,6 @@ EFFECT = Effect(
     direction="velocity",
     angles=("patch_theta",),
     linear=("patch_mu",),
+    region=("patch_x", "patch_y", "patch_length", "patch_width", "patch_theta"),
     sticks=True,
 )

@@ -36,4 +36,5 @@ EFFECT = Effect(
     ),
     where=where,
     direction="world",
+    pins=("pivot_x", "pivot_y"),
 )

@@ -17,10 +17,11 @@ from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, judged
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
-from pbrl_mismatch.search.hypothesis import Hypothesis
+from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
 from pbrl_mismatch.search.library import search_library, trace
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.ground import traced
+from pbrl_mismatch.search.path.pins import may_be_pinned
 from pbrl_mismatch.search.path.starts import BENT
 from pbrl_mismatch.search.predictive import predictive_test
 from pbrl_mismatch.search.weigh import Weighed, veto, weigh
@@ -33,16 +34,14 @@ FEWER = {"shortlist": 6, "candidates": 2, "keep": (1, 1)}
 """What is looked at where an effect is laid on another: the ground is nearly right."""
 REACHED = 1.12
 """A hypothesis that needs less than this scale of the noise predicts windows of its length."""
-POLISHED, LONGER = 5, 2
-"""So many of the likeliest effects are climbed on, for so many times the usual steps."""
+POLISHED, POLISHED_OF_SETS, LONGER = 5, 3, 2
+"""So many of the likeliest effects, and of the likeliest sets, are climbed on, for so many times the usual steps."""
 LEADS = 3
 """So many of the likeliest effects lead a baseline to where they have the body's own parameters."""
 LED = 100.0
 """Kinds of baseline that are worse than the best by more [nat] are not led: no other top would do."""
 FREEDOM = 1.0
 """An effect that says nothing is less likely than the baseline by about so much at least, for its freedom [nat]."""
-NEAR_THE_FLOOR = 1.1
-"""A hypothesis that needs less than this scale of the noise leaves nothing worth another effect."""
 WORTH_A_KIND = 3.0
 """A kind of baseline with more parameters is worth a search of its own where it is better by this [nat]."""
 
@@ -90,7 +89,7 @@ def explain(
     bases = [trace(longest, options, each, each.peak.coordinates) for each in bases]
     bases = sorted(bases, key=lambda each: -each.evidence)
     tried = _tried(seeds[0], track, _grounds(bases), stages, grip, options)
-    bases = _reached(bases, tried, stages, options)
+    bases = led(bases, tried, stages, options)
     singles = weigh(bases, tried, options)
     if _falls_short(tried) and len(stages.fitted) > 1:
         tried = _polished(singles, tried, stages, options)
@@ -98,20 +97,33 @@ def explain(
         stages, bases = stages.without_longest(), [each.over_shorter() for each in bases]
         bases = sorted(bases, key=lambda each: -each.evidence)
         tried = [beside_motion(each.over_shorter(), grip) for each in tried]
-        bases = _reached(bases, tried, stages, options)
+        bases = led(bases, tried, stages, options)
     tried = [beside_motion(each, grip) for each in _polished(weigh(bases, tried, options), tried, stages, options)]
     weighed = weigh(bases, tried, options)
     odds = min(_log_odds(singles), _log_odds(weighed))
     for depth in range(1, options.most_together):
-        deepest = [each.fitted for each in weighed if len(each.effects) == depth][:GROUNDS_OF_SETS]
-        best = weighed[0]
-        enough = len(best.effects) < depth or best.fitted.noise_scale < NEAR_THE_FLOOR
-        if enough or not deepest or predictive_test(best.fitted.peak, 0).p_value >= options.level:
+        deepest = _grounds_of_sets([each.fitted for each in weighed if len(each.effects) == depth], track)
+        if len(weighed[0].effects) < depth or not _lacks(weighed[0].fitted, grip, options):
             break
         fewer = options.model_copy(update=FEWER)
-        tried += _tried(seeds[depth], track, deepest, stages, grip, fewer)
+        more = _tried(seeds[depth], track, deepest, stages, grip, fewer)
+        likely = tuple(each for each in weigh(bases, [*tried, *more], options) if len(each.effects) != depth)
+        tried += [beside_motion(each, grip) for each in _polished(likely, more, stages, options, POLISHED_OF_SETS)]
         weighed = weigh(bases, tried, options)
     return Explained(weighed, bases, stages, odds)
+
+
+def _grounds_of_sets(likeliest: list[Fitted], track: Track) -> list[Fitted]:
+    """Return the hypotheses that one effect more is tried on: a pin too, where a place stood still."""
+    first, rest = likeliest[:GROUNDS_OF_SETS], likeliest[GROUNDS_OF_SETS:]
+    pins = [each for each in rest if any(EFFECTS[name].pins for name in each.hypothesis.effects)]
+    return first + (pins[:1] if may_be_pinned(track) else [])
+
+
+def _lacks(best: Fitted, grip: GripEvidence | None, options: DiagnoseOptions) -> bool:
+    """Tell whether something is left out of what explains most: in the motion, or in the gripper's poses beside it."""
+    slips = grip is not None and GRASP_COMPLIANCE not in best.hypothesis.effects and grip.p_value < options.level
+    return slips or predictive_test(best.peak, 0).p_value < options.level
 
 
 def _falls_short(tried: list[Fitted]) -> bool:
@@ -119,7 +131,7 @@ def _falls_short(tried: list[Fitted]) -> bool:
     return min(each.noise_scale for each in tried) > REACHED
 
 
-def _reached(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: DiagnoseOptions) -> list[Fitted]:
+def led(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: DiagnoseOptions) -> list[Fitted]:
     """Return the baselines climbed on from where likely effects have mass and wheel, best first.
 
     Where bodies stick there are many tops. An effect that does nothing but lead to a better one explains nothing.
@@ -140,7 +152,7 @@ def _lowest(fitted: Fitted) -> float:
 
 
 def _polished(
-    weighed: tuple[Weighed, ...], tried: list[Fitted], stages: Stages, options: DiagnoseOptions
+    weighed: tuple[Weighed, ...], tried: list[Fitted], stages: Stages, options: DiagnoseOptions, most: int = POLISHED
 ) -> list[Fitted]:
     """Return what was tried, the likeliest climbed on, also from what the best one has for the baseline's parameters.
 
@@ -151,7 +163,7 @@ def _polished(
     none = max((each.fitted.evidence for each in weighed if not each.effects), default=-math.inf)
     if best is None or best.evidence < none - FREEDOM:
         return tried
-    names = [each.effects for each in weighed if each.effects][:POLISHED]
+    names = [each.effects for each in weighed if each.effects][:most]
     chosen = {id(each.fitted) for each in weighed if each.effects in names}
     jobs = [each for each in tried if id(each) in chosen and GRASP_COMPLIANCE not in each.hypothesis.effects]
     with ThreadPoolExecutor(options.workers) as pool:
@@ -164,8 +176,12 @@ def _polished(
 def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseOptions) -> Fitted:
     """Return a hypothesis climbed on from where it is, and from where another has the body's own parameters."""
     own = fitted.peak.coordinates[0]
-    starts = [own, _crossed(fitted.hypothesis, own, best.hypothesis, best.peak.coordinates[0])]
-    starts += [_afresh(fitted.hypothesis, own)] if fitted.hypothesis.effects else []
+    crossed = _crossed(fitted.hypothesis, own, best.hypothesis, best.peak.coordinates[0])
+    starts = [own, crossed]
+    if fitted.hypothesis.effects:
+        # What the best one bent of mass and delay may be the very thing that another effect explains.
+        bent = np.isin(fitted.hypothesis.columns, list(BELIEVED))
+        starts += [_afresh(fitted.hypothesis, own), np.where(bent, own, crossed)]
     starts += [fitted.traced.coordinates] if fitted.traced is not None else []
     objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
     peak = climb(objective, np.array(starts), iterations=LONGER * options.iterations[-1])
@@ -179,9 +195,10 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
 
 
 def _crossed(hypothesis: Hypothesis, own: Array, other: Hypothesis, coordinates: Array) -> Array:
-    """Return the coordinates (K,) of a hypothesis with the body's own parameters as another one has them."""
+    """Return the coordinates (K,) of a hypothesis with what is the body's, or of effects of both, as another has it."""
     crossed = own.copy()
-    effect = {column for name in hypothesis.effects for v in EFFECTS[name].variants for column in v}
+    alone = set(hypothesis.effects) - set(other.effects)
+    effect = {column for name in alone for v in EFFECTS[name].variants for column in v}
     for k, column in enumerate(hypothesis.columns):
         if column in other.columns and column not in effect:
             crossed[k] = coordinates[other.columns.index(column)]

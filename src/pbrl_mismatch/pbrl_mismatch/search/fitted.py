@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import Peak, climb
 from pbrl_mismatch.search.heldout import Score, held_out_score
-from pbrl_mismatch.search.hypothesis import Hypothesis
+from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.along import lay_along
 from pbrl_mismatch.search.path.climb import climb_along
@@ -138,7 +139,10 @@ def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:
 
 
 def scene_of(track: Track, row: Array) -> Scene:
-    """Return what priors are scaled by, with the mass of a baseline's row."""
+    """Return what priors are scaled by, with the mass of a baseline's row where none was told.
+
+    The told one counts where there is one: a baseline that lacks what holds a body back makes it many times heavier.
+    """
     lower, upper = track.outline.min(axis=0), track.outline.max(axis=0)
     half = 0.5 * (upper - lower)
     size = float(np.hypot(*half))
@@ -151,7 +155,7 @@ def scene_of(track: Track, row: Array) -> Scene:
         reach=0.5 * (high - low) + size,
         centroid=0.5 * (lower + upper),
         half=half,
-        mass=float(row[COLUMN["mass"]]),
+        mass=float(row[COLUMN["mass"]]) if math.isnan(track.nominal_mass) else track.nominal_mass,
         force=max(float(np.sqrt(np.mean(force**2))), 0.5),
         speed=max(float(np.sqrt(np.mean(speed[moving] ** 2))) if moving.any() else 0.0, MOVING),
         start=float(track.clock[0]),
@@ -193,7 +197,7 @@ def fit_baseline(
     starts = hypothesis.sample_prior(rng, BASELINE_STARTS)
     columns = hypothesis.columns
     for k, name in enumerate(columns):
-        if name in ("mass", "inertia_factor", "delay"):
+        if name in BELIEVED:
             starts[:, k] = hypothesis.mean[k]
     if "wheel_x" in columns:
         x, y = columns.index("wheel_x"), columns.index("wheel_y")

@@ -19,6 +19,8 @@ FURTHEST = 3.5
 """An effect's parameter is no further from its prior's centre than so many of its standard deviations."""
 OF_THE_BODY = frozenset({*KERNEL_COLUMNS, "inertia_factor", "delay"})
 """Columns of a baseline."""
+BELIEVED = frozenset({"mass", "inertia_factor", "delay", "sensor_turn", "com_x", "com_y"})
+"""Columns of a baseline of which something is known beforehand."""
 SHARE = 1e-2
 """Of a prior's spread: friction is solved for only so exactly, and a finite difference must be well above that."""
 SMALL = {"m": 0.005, "s": 0.02, "rad": 0.01}
@@ -111,12 +113,16 @@ class BaselineOptions:
         mass_spread: standard deviation of its logarithm.
         inertia_spread: standard deviation of the logarithm of inertia over its nominal value.
         delay_spread: standard deviation of the poses' delay that nobody would call a fault [s].
+        grasp_spread: of the wrench's direction [rad]; 0: known exactly.
+        outline_spread: of each side of the footprint [m]; 0: known exactly.
     """
 
     mass: float
     mass_spread: float
     inertia_spread: float
     delay_spread: float
+    grasp_spread: float = 0.0
+    outline_spread: float = 0.0
 
 
 def baselines(
@@ -140,6 +146,12 @@ def baselines(
             Parameter("inertia_factor", 1.0, options.inertia_spread, positive=True),
             Parameter("delay", 0.0, options.delay_spread),
         ]
+        if options.grasp_spread > 0.0:
+            parameters.append(Parameter("sensor_turn", 0.0, options.grasp_spread))
+        if options.outline_spread > 0.0:
+            # The middle of two sides, each off by itself.
+            off = options.outline_spread / math.sqrt(2.0)
+            parameters += [Parameter("com_x", 0.0, off), Parameter("com_y", 0.0, off)]
         parts = kind.split("+")
         if "caster" in parts or "wheel" in parts:
             base[COLUMN["cone"]], base[COLUMN["mu_y"]] = 1.0, -1.0

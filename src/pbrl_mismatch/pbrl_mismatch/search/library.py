@@ -20,6 +20,7 @@ from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.climb import PathPeak
 from pbrl_mismatch.search.path.ground import ground_of, traced
+from pbrl_mismatch.search.path.pins import may_be_pinned
 from pbrl_mismatch.search.path.starts import starts_of
 
 Array = NDArray[np.float64]
@@ -78,9 +79,12 @@ def search_library(
         chosen = _survivors([each.hypothesis for each in begun], begun, most, CLOSE[0])
         if min(each.noise_scale for each in begun) > RESTLESS:
             chosen = sorted({*chosen, *(k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].sticks)})
+        pins = [k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].pins and may_be_pinned(longest.track)]
+        # A pin is so stiff that a path a millimetre off says nothing of it.
+        chosen = sorted({*chosen, *pins})
         running = [(begun[k].hypothesis, begun[k].coordinates) for k in chosen]
         first = _survivors([each.hypothesis for each in begun], begun, LEADING, 0.0)
-        leading = {begun[k].hypothesis.variant for k in first}
+        leading = {begun[k].hypothesis.variant for k in (*first, *pins)}
         before: list[Peak | None] = [None] * len(running)
         for stage in range(len(stages.fitted)):
             rough = stage + 2 < len(stages.fitted)

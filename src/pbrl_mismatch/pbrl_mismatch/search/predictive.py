@@ -22,6 +22,7 @@ from scipy.stats import f as f_distribution
 
 from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.search.climb import Peak
+from pbrl_mismatch.search.hypothesis import BELIEVED
 from pbrl_mismatch.search.objective import START, WRENCH
 
 Array = NDArray[np.float64]
@@ -34,8 +35,6 @@ TELLING = 0.05
 FLOORS = (1.0, 0.6, 0.3, 0.1, 0.03)
 """Shares of the sensor's own error that the windows are asked for; the likeliest counts, none is larger than told."""
 
-BELIEVED = frozenset({"mass", "inertia_factor", "delay"})
-"""Columns of the baseline of which something is known beforehand."""
 UNBELIEVABLE = 1e-3
 """A conflict with that knowledge counts from here on; above, it leaves the p-value as the motion has it."""
 

@@ -14,10 +14,10 @@ from pbrl_mismatch.search.fitted import Fitted
 VETO, VETO_SHARE = 8.0, 0.05
 """A hypothesis that predicts held-out windows worse than the baseline by this much [nat], and this share of what its
 evidence gained, is not named."""
-DISCREPANCY, SHORT_OF_IT = 0.15, 0.5
+DISCREPANCY, SHORT_OF_IT = 0.04, 0.5
 """Share of what a law explains that its being wrong may leave for others to explain: where the others then reach the
 noise floor, and where even they do not."""
-FLOOR = 1.04
+FLOOR = 1.015
 """A set that needs less than this scale of the noise reaches the floor."""
 JUDGED = 3
 """So many of the likeliest are held against held-out windows at most."""

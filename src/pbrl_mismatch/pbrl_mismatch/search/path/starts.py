@@ -5,18 +5,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_mismatch.data.residual import residual_wrench
 from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.fitted import Fitted, apart, scene_of
-from pbrl_mismatch.search.hypothesis import Hypothesis
+from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
 from pbrl_mismatch.search.path.climb import PathPeak, climb_along
 from pbrl_mismatch.search.path.contacts import contact_points, with_contacts
 from pbrl_mismatch.search.path.ground import Ground
+from pbrl_mismatch.search.path.pins import with_pins
 from pbrl_mismatch.search.path.pulls import with_pulls
+from pbrl_mismatch.search.path.regions import tile_friction, with_regions
 from pbrl_mismatch.search.path.rhythms import with_rhythms
 from pbrl_mismatch.search.path.screen import screen
-from pbrl_mismatch.search.predictive import BELIEVED
+from pbrl_model.kernel import GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -99,10 +102,23 @@ def _drawn(
         point = (at[0], at[1]) if at else None
         cord = columns.index(effect.cord) if effect.cord else None
         draws = with_pulls(rng, draws, (x, y), point, cord, track, lacks)
+    if effect.pins is not None:
+        draws = with_pins(rng, draws, (columns.index(effect.pins[0]), columns.index(effect.pins[1])), track)
+    if effect.region is not None:
+        x, y, length, width, angle = (columns.index(column) for column in effect.region)
+        as_believed = residual_wrench(track, _believed_row(base, ground))
+        tiles = tile_friction(track, as_believed, GRAVITY * scene_of(track, base.row).mass)
+        draws = with_regions(rng, draws, (x, y, length, width, angle), *tiles)
     if effect.rhythm is not None and effect.rhythm[0] in columns:
         frequency, phase = (columns.index(name) for name in effect.rhythm)
         draws = with_rhythms(rng, draws, frequency, phase, lacks, track.gyration)
     return draws, afresh
+
+
+def _believed_row(base: Fitted, ground: Ground) -> Array:
+    """Return the row (WIDTH,) of a ground whose place is fitted and whose mass and friction are as was believed."""
+    kept = np.isin(base.hypothesis.columns, list(KEPT))
+    return base.hypothesis.rows(np.where(kept, ground.coordinates, base.hypothesis.mean)[None])[0]
 
 
 def _first_of(misfit: Array, among: NDArray[np.bool_]) -> NDArray[np.int64]:
