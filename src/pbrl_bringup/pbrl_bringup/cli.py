@@ -242,7 +242,10 @@ def info(bag: Bag, mapping: Mapping = None) -> int:
 def bench(
     name: Annotated[
         str,
-        typer.Argument(help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose, calibration or concealed."),
+        typer.Argument(
+            help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose, calibration, concealed, "
+            "next-experiment or mismatch."
+        ),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,
     seed: Seed = 0,
