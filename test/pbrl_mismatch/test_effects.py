@@ -54,6 +54,15 @@ def test_draws_of_the_prior_and_rows_go_round(name: str) -> None:
         assert hypothesis.effects == (name,)
 
 
+def test_a_point_of_the_body_is_looked_for_on_the_body_alone() -> None:
+    base = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.01), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    hypothesis = base.with_effect(EFFECTS["second_wheel"], SCENE, 0)
+    draws = hypothesis.mean + 9.0 * hypothesis.spread * np.random.default_rng(0).standard_normal((200, 1))
+    held = hypothesis.believable(draws)[:, [hypothesis.columns.index(name) for name in ("wheel2_x", "wheel2_y")]]
+    assert np.all(np.abs(held - SCENE.centroid) <= SCENE.half + 1e-12)
+    assert np.isclose(np.abs(held - SCENE.centroid), SCENE.half).any()
+
+
 def test_unknown_names_are_told_the_nearest() -> None:
     with pytest.raises(MismatchError, match="did you mean 'tether'"):
         effect_named("teter")

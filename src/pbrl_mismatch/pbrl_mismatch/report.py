@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from pbrl_mismatch.activity import activity
-from pbrl_mismatch.effects.effect import Effect, Scene
+from pbrl_mismatch.effects.effect import Effect, Scene, Where
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.predictive import Verdict
@@ -28,6 +29,8 @@ SHARE_LEFT, NEAR = 0.1, 2.0
 ALIKE = 3.0
 """Hypotheses within so many nats explain the recording alike."""
 SHOWN = 8
+OUTLINE = 32
+"""Corners of an ellipse."""
 LEAST_TOLD = 1e-12
 """Tails further out than this are not told: no noise is known so well."""
 
@@ -40,7 +43,7 @@ class Finding:
         effect: its name.
         probability: of the hypothesis.
         parameters: mean, sd and unit by name.
-        where: frame and outline, or None.
+        where: frame, outline and the ellipse that holds its middle with 95 %, or None.
         when: intervals [s], or None.
         direction: the frame in which its force keeps its direction, or what it follows.
         fitted: the hypothesis.
@@ -122,11 +125,37 @@ def _finding(weighed: Weighed, effect: Effect, scene: Scene) -> Finding:
         effect.name,
         weighed.probability,
         parameters,
-        None if where is None else {"frame": where.frame, "shape": np.round(where.shape, 4).tolist()},
+        None if where is None else _told(where, place_uncertainty(fitted, effect, where)),
         None if acts is None else [list(each) for each in acts],
         effect.direction,
         fitted,
     )
+
+
+def _told(where: Where, uncertainty: Array | None) -> dict[str, Any]:
+    """Return the form of `report.json`."""
+    told: dict[str, Any] = {"frame": where.frame, "shape": np.round(where.shape, 4).tolist()}
+    return told if uncertainty is None else {**told, "uncertainty": np.round(uncertainty, 4).tolist()}
+
+
+def place_uncertainty(fitted: Fitted, effect: Effect, where: Where) -> Array | None:
+    """Return the ellipse (n, 2) [m] that holds the middle of an effect's place with 95 %, or None if it is not free.
+
+    It is long where a recording shows only a line: that of a wheel which was never pushed along its axle, say.
+
+    Args:
+        fitted: with the effect, its posterior by Laplace.
+        effect: that has a place.
+        where: that place.
+    """
+    columns = fitted.hypothesis.columns
+    if effect.place is None or not set(effect.place) <= set(columns):
+        return None
+    chosen = [columns.index(column) for column in effect.place]
+    size, axes = np.linalg.eigh(fitted.peak.covariance(0)[np.ix_(chosen, chosen)])
+    angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE, endpoint=False)
+    circle = np.sqrt(chi2.ppf(0.95, 2) * np.maximum(size, 0.0)) * np.stack([np.cos(angle), np.sin(angle)], -1)
+    return np.asarray(where.shape.mean(axis=0) + circle @ axes.T, dtype=np.float64)
 
 
 def parameters_of(fitted: Fitted, columns: set[str] | None = None) -> dict[str, dict[str, Any]]:

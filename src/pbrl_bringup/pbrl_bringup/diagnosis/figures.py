@@ -84,6 +84,10 @@ def _where(axes: Axes, entry: Mapping[str, Any], last: Array) -> None:
         axes.fill(*shape.T, facecolor=PURPLE, alpha=0.2, edgecolor=PURPLE, lw=1.5, zorder=4)
     else:
         axes.plot(*shape.T, "P", color=PURPLE, ms=10, zorder=4)
+    if where.get("uncertainty"):
+        around = np.array(where["uncertainty"], dtype=float)
+        around = around if where["frame"] in ON_THE_FLOOR else _placed(around, last)
+        axes.plot(*np.vstack([around, around[:1]]).T, color=PURPLE, lw=1.0, ls=(0, (4, 3)), zorder=4)
     top = shape[np.argmax(shape[:, 1])]
     axes.annotate(
         entry["effect"], top, xytext=(0, 4), textcoords="offset points", color=PURPLE, fontsize=10, ha="center"

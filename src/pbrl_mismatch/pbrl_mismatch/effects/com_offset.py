@@ -36,5 +36,6 @@ EFFECT = Effect(
         ),
     ),
     where=where,
+    place=("com_x", "com_y"),
     direction="body",
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain, positive
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, on_body, plain, positive
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -12,8 +12,8 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         plain("detent_x", float(scene.middle[0]), 0.7 * float(scene.reach[0])),
         plain("detent_y", float(scene.middle[1]), 0.7 * float(scene.reach[1])),
         positive("detent_width", 0.03, 0.7),
-        plain("detent_at_x", float(scene.centroid[0]), 0.6 * float(scene.half[0])),
-        plain("detent_at_y", float(scene.centroid[1]), 0.6 * float(scene.half[1])),
+        on_body("detent_at_x", float(scene.centroid[0]), float(scene.half[0]), 0.6),
+        on_body("detent_at_y", float(scene.centroid[1]), float(scene.half[1]), 0.6),
     )
 
 
@@ -45,6 +45,7 @@ EFFECT = Effect(
         ),
     ),
     where=where,
+    place=("detent_x", "detent_y"),
     direction="place",
     linear=("detent_force",),
     pulls=("detent_x", "detent_y", "detent_at_x", "detent_at_y"),

@@ -27,12 +27,14 @@ class Parameter:
         centre: most likely value [the column's unit].
         spread: standard deviation [the column's unit], or of the logarithm where `positive`.
         positive: the coordinate is the logarithm.
+        furthest: from the mean in the coordinate that it can be at all.
     """
 
     column: str
     centre: float
     spread: float
     positive: bool = False
+    furthest: float = math.inf
 
     def __post_init__(self) -> None:
         if self.column not in COLUMN:
@@ -56,6 +58,11 @@ class Parameter:
 def plain(column: str, centre: float, spread: float) -> Parameter:
     """Return a parameter that may be of either sign."""
     return Parameter(column, centre, spread)
+
+
+def on_body(column: str, centre: float, half: float, share: float) -> Parameter:
+    """Return a coordinate of a point of the body: within half a side of the footprint, the spread a share of that."""
+    return Parameter(column, centre, share * half, furthest=half)
 
 
 def positive(column: str, centre: float, spread: float) -> Parameter:
@@ -117,6 +124,7 @@ class Effect:
         fixed: columns that are given a value while the effect is on.
         fixed_in: others that are given one in some variants alone, by the variant's number.
         where: the place it has, from its parameters, or None.
+        place: columns of the middle of that place.
         direction: the frame in which its force keeps its direction, or what it follows.
         angles: columns that live on a circle.
         linear: columns that the effect's wrench is proportional to, all together.
@@ -139,6 +147,7 @@ class Effect:
     fixed: Mapping[str, float] = field(default_factory=dict)
     fixed_in: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
     where: Callable[[Values, Scene], Where | None] | None = None
+    place: tuple[str, str] | None = None
     direction: str | None = None
     angles: tuple[str, ...] = ()
     linear: tuple[str, ...] = ()

@@ -52,6 +52,7 @@ EFFECT = Effect(
         ),
     ),
     where=where,
+    place=("patch_x", "patch_y"),
     direction="velocity",
     angles=("patch_theta",),
     linear=("patch_mu",),

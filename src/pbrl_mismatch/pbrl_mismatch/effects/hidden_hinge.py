@@ -35,6 +35,7 @@ EFFECT = Effect(
         ),
     ),
     where=where,
+    place=("pivot_x", "pivot_y"),
     direction="world",
     pins=("pivot_x", "pivot_y"),
 )

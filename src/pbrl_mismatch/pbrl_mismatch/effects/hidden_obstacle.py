@@ -37,6 +37,7 @@ EFFECT = Effect(
         ),
     ),
     where=where,
+    place=("obstacle_x", "obstacle_y"),
     direction="contact",
     touches=("obstacle_x", "obstacle_y", "obstacle_radius"),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain, positive
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, on_body, plain, positive
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -10,8 +10,8 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
     return (
         positive("payload_mass", 0.3 * scene.mass, 0.7),
         plain("payload_time", scene.start + 0.5 * scene.seconds, 0.35 * scene.seconds),
-        plain("payload_x", float(scene.centroid[0]), 0.5 * float(scene.half[0])),
-        plain("payload_y", float(scene.centroid[1]), 0.5 * float(scene.half[1])),
+        on_body("payload_x", float(scene.centroid[0]), float(scene.half[0]), 0.5),
+        on_body("payload_y", float(scene.centroid[1]), float(scene.half[1]), 0.5),
     )
 
 
@@ -42,6 +42,7 @@ EFFECT = Effect(
     ),
     fixed_in={1: {"payload_gone": 1.0}},
     where=where,
+    place=("payload_x", "payload_y"),
     direction="acceleration",
     linear=("payload_mass",),
 )

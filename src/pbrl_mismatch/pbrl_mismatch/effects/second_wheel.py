@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain, positive
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, on_body, plain, positive
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
     """Return what is believed of its parameters."""
     return (
-        plain("wheel2_x", float(scene.centroid[0]), 0.8 * float(scene.half[0])),
-        plain("wheel2_y", float(scene.centroid[1]), 0.8 * float(scene.half[1])),
+        on_body("wheel2_x", float(scene.centroid[0]), float(scene.half[0]), 0.8),
+        on_body("wheel2_y", float(scene.centroid[1]), float(scene.half[1]), 0.8),
         plain("wheel2_theta", 0.0, 1.0),
         positive("wheel2_mu_x", 0.08, 1.0),
         positive("wheel2_mu_y", 0.08, 1.0),
@@ -36,6 +36,7 @@ EFFECT = Effect(
     ),
     fixed={"wheel2_mu_y": -1.0},
     where=where,
+    place=("wheel2_x", "wheel2_y"),
     direction="body",
     angles=("wheel2_theta",),
     linear=("wheel2_mu_x", "wheel2_mu_y"),

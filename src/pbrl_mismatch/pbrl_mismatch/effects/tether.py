@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain, positive
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, on_body, plain, positive
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -12,8 +12,8 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         plain("tether_x", float(scene.middle[0]), 1.2 * float(scene.reach[0])),
         plain("tether_y", float(scene.middle[1]), 1.2 * float(scene.reach[1])),
         positive("tether_length", 0.6, 0.7),
-        plain("tether_at_x", float(scene.centroid[0]), 0.6 * float(scene.half[0])),
-        plain("tether_at_y", float(scene.centroid[1]), 0.6 * float(scene.half[1])),
+        on_body("tether_at_x", float(scene.centroid[0]), float(scene.half[0]), 0.6),
+        on_body("tether_at_y", float(scene.centroid[1]), float(scene.half[1]), 0.6),
     )
 
 
@@ -39,6 +39,7 @@ EFFECT = Effect(
         ),
     ),
     where=where,
+    place=("tether_x", "tether_y"),
     direction="anchor",
     linear=("tether_stiffness",),
     pulls=("tether_x", "tether_y", "tether_at_x", "tether_at_y"),

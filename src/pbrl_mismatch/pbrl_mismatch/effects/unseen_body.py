@@ -35,6 +35,7 @@ EFFECT = Effect(
         ),
     ),
     where=where,
+    place=("unseen_x", "unseen_y"),
     direction="contact",
     linear=("unseen_force",),
     remembers=True,

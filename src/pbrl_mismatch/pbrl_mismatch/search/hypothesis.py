@@ -80,8 +80,9 @@ class Hypothesis:
         Where no law is right, a wrong one would else buy what it explains with a force sensor that is off fivefold. The
         body's own are left as they are: how far off they have to be is itself a sign of a mismatch.
         """
-        reach = np.array([math.inf if column in OF_THE_BODY else FURTHEST for column in self.columns])
-        return np.clip(coordinates, self.mean - reach * self.spread, self.mean + reach * self.spread)
+        reach = np.array([math.inf if column in OF_THE_BODY else FURTHEST for column in self.columns]) * self.spread
+        reach = np.minimum(reach, [parameter.furthest for parameter in self.parameters])
+        return np.clip(coordinates, self.mean - reach, self.mean + reach)
 
     def sample_prior(self, rng: np.random.Generator, count: int) -> Array:
         """Draw (count, K) coordinates."""

@@ -1,0 +1,44 @@
+"""What a report says of places: an ellipse that holds the middle of an effect's place as often as it promises."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from shapely import Polygon, contains_xy
+
+from pbrl_mismatch import EFFECTS
+from pbrl_mismatch.effects.effect import disc
+from pbrl_mismatch.report import place_uncertainty
+
+COVARIANCE = np.array([[0.04, 0.018, 0.0], [0.018, 0.01, 0.0], [0.0, 0.0, 1.0]])
+MIDDLE = np.array([0.3, -0.2])
+
+
+def fitted(columns: tuple[str, ...]) -> Any:
+    """Return a stand-in for a fit with a posterior over some columns."""
+    return SimpleNamespace(
+        hypothesis=SimpleNamespace(columns=columns), peak=SimpleNamespace(covariance=lambda row: COVARIANCE)
+    )
+
+
+def test_the_ellipse_holds_the_middle_in_95_percent() -> None:
+    wheel = EFFECTS["second_wheel"]
+    found = place_uncertainty(fitted(("wheel2_x", "wheel2_y", "mass")), wheel, disc("body", *MIDDLE, 0.05))
+    assert found is not None
+    draws = np.random.default_rng(0).multivariate_normal(MIDDLE, COVARIANCE[:2, :2], 20_000)
+    assert np.mean(contains_xy(Polygon(found), *draws.T)) == pytest.approx(0.95, abs=0.01)
+
+
+def test_a_place_that_is_not_free_has_none() -> None:
+    where = disc("body", *MIDDLE, 0.05)
+    assert place_uncertainty(fitted(("wheel2_x", "mu_x", "mass")), EFFECTS["second_wheel"], where) is None
+    assert place_uncertainty(fitted(("wheel2_x", "wheel2_y", "mass")), EFFECTS["wrench_bias"], where) is None
+
+
+def test_every_place_s_middle_is_where_its_outline_is() -> None:
+    placed = [effect for effect in EFFECTS.values() if effect.where is not None]
+    assert placed and all(effect.place is not None for effect in placed)
+    assert all(effect.place is None for effect in EFFECTS.values() if effect.where is None)
