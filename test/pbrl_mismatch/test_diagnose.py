@@ -167,5 +167,5 @@ def test_bad_input_is_refused_in_one_line(dragged: Recording) -> None:
     ],
 )
 def test_bad_options_are_refused(options: dict[str, object]) -> None:
-    with pytest.raises(MismatchError, match=r"expected|did you mean|greater|less|valid"):
+    with pytest.raises(MismatchError, match=r"expected|did you mean|greater|less|valid|finite"):
         DiagnoseOptions(**options)

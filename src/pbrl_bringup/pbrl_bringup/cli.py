@@ -277,7 +277,8 @@ def experiment(
     name: Annotated[
         str,
         typer.Argument(
-            help="shopping-cart, shopping-cart-noisy, apartment, sample-efficiency, noise, robot-fits or contact."
+            help="shopping-cart, shopping-cart-noisy, apartment, sample-efficiency, noise, robot-fits, limits or "
+            "contact."
         ),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/experiment/NAME.")] = None,

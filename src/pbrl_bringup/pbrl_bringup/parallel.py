@@ -8,7 +8,8 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, get_context, parent_process
+from types import FrameType
 from typing import Any, TypeVar
 
 from pbrl_bringup.processes import die_with_parent
@@ -16,6 +17,8 @@ from pbrl_bringup.terminal import progress
 
 Result = TypeVar("Result")
 
+UNWINDING = 2.0
+"""So long [s] a process has for what it began, once it is told to end."""
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
@@ -67,5 +70,15 @@ def _one_thread_each() -> Iterator[None]:
 def _obey_the_parent() -> None:
     """Leave Ctrl-C, which the terminal sends to all, to the parent; let its SIGTERM unwind the stack."""
     die_with_parent()
+    parent = parent_process()
+    if parent is not None and not parent.is_alive():  # it died before the tie was made
+        os._exit(1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
+    signal.signal(signal.SIGTERM, _end)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    """Unwind the stack; a pool takes that for the failure of one job and would go on to the next, so end soon after."""
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.setitimer(signal.ITIMER_REAL, UNWINDING)
+    sys.exit(128 + number)
