@@ -43,7 +43,7 @@ class Finding:
         effect: its name.
         probability: of the hypothesis.
         parameters: mean, sd and unit by name.
-        where: frame, outline and the ellipse that holds its middle with 95 %, or None.
+        where: frame, outline and the ellipse that holds its middle with 95 % by Laplace, or None.
         when: intervals [s], or None.
         direction: the frame in which its force keeps its direction, or what it follows.
         fitted: the hypothesis.
@@ -141,7 +141,8 @@ def _told(where: Where, uncertainty: Array | None) -> dict[str, Any]:
 def place_uncertainty(fitted: Fitted, effect: Effect, where: Where) -> Array | None:
     """Return the ellipse (n, 2) [m] that holds the middle of an effect's place with 95 %, or None if it is not free.
 
-    It is long where a recording shows only a line: that of a wheel which was never pushed along its axle, say.
+    It is long where a recording shows only a line: that of a wheel which was never pushed along its axle, say. It is by
+    Laplace: where such a line bends, it is too short.
 
     Args:
         fitted: with the effect, its posterior by Laplace.

@@ -19,7 +19,6 @@ from scipy.stats import chi2, ncx2
 
 from pbrl_bag.types import Recording
 from pbrl_bringup.concealed.truth import Truth
-from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.grip import lay_grips
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.diagnose import fit_baselines, track_of
@@ -29,7 +28,6 @@ from pbrl_mismatch.search.explain import led
 from pbrl_mismatch.search.fitted import Fitted, Stages, cut_stages, fit_from, judged, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way, grip_evidence
 from pbrl_mismatch.search.hypothesis import BaselineOptions, Hypothesis, baselines
-from pbrl_mismatch.search.library import trace
 from pbrl_mismatch.search.told_baseline import ToldBaseline
 
 Array = NDArray[np.float64]
@@ -130,9 +128,6 @@ def oracle(laid: Laid, truth: Truth) -> Oracle:
     best = _best_told(laid, truth, bases)
     # A baseline that had not found its best would make what was concealed look stronger than it is.
     bases = led(bases, [best], laid.stages, laid.options)
-    longest = cut_windows(laid.track, max(laid.options.windows))
-    best, *bases = (trace(longest, laid.options, each, each.peak.coordinates) for each in (best, *bases))
-    bases = sorted(bases, key=lambda each: -each.evidence)
     return Oracle(judged(best, laid.stages, laid.options), judged(bases[0], laid.stages, laid.options, even=True))
 
 
@@ -151,8 +146,7 @@ def _best_told(laid: Laid, truth: Truth, bases: list[Fitted]) -> Fitted:
 def seen(laid: Laid, truth: Truth) -> Oracle | None:
     """Return the oracle if what was concealed is at least what it detects in 95 % of recordings, else nothing.
 
-    It has to be likelier than nothing left out, too: a wheel that no hand makes slide is as good as a pin. Of several
-    effects each has to be, beside an oracle that is told the others: what cannot be seen cannot be named.
+    Of several effects each has to be, beside an oracle that is told the others: what cannot be seen cannot be named.
 
     Most draws that are too weak are so by far. They are told by one climb from the truth with the effects and one
     without: what keeps the baseline from better optima makes the effects look stronger, never weaker.
@@ -160,7 +154,7 @@ def seen(laid: Laid, truth: Truth) -> Oracle | None:
     if _glance(laid, truth).times_detectable < HOPELESS:
         return None
     found = oracle(laid, truth)
-    if found.times_detectable < 1.0 or found.gain < 0.0:
+    if found.times_detectable < 1.0:
         return None
     return found if len(truth.effects) < 2 or _each_seen(laid, truth, found) else None
 

@@ -197,8 +197,8 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
 def _crossed(hypothesis: Hypothesis, own: Array, other: Hypothesis, coordinates: Array) -> Array:
     """Return the coordinates (K,) of a hypothesis with what is the body's, or of effects of both, as another has it."""
     crossed = own.copy()
-    alone = set(hypothesis.effects) - set(other.effects)
-    effect = {column for name in alone for v in EFFECTS[name].variants for column in v}
+    not_shared = set(hypothesis.effects) - set(other.effects)
+    effect = {column for name in not_shared for v in EFFECTS[name].variants for column in v}
     for k, column in enumerate(hypothesis.columns):
         if column in other.columns and column not in effect:
             crossed[k] = coordinates[other.columns.index(column)]
