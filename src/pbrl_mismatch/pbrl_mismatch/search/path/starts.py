@@ -25,8 +25,13 @@ Array = NDArray[np.float64]
 
 BENT = BELIEVED | {"mu_x", "mu_y"}
 """Columns of a ground that bend to what it lacks: half of the starts have them as they were believed to be."""
-KEPT = frozenset({"wheel_x", "wheel_y", "wheel_theta", "hinge_x", "hinge_y", "hinge_radius"})
-"""Columns of a ground that every start has as the ground has them."""
+PLACES = frozenset(
+    column
+    for effect in EFFECTS.values()
+    for column in (*(effect.place or ()), *(effect.touches or ()), *effect.pulls, *(effect.region or ()))
+)
+KEPT = (PLACES | {"wheel_x", "wheel_y", "wheel_theta", "hinge_x", "hinge_y", "hinge_radius"}) - BENT
+"""Columns of a ground that every start has as the ground has them: where something is was hard to find."""
 PARENTS, NEARBY = 3, 0.15
 """Of the draws of each half so many are drawn about again; how far, in standard deviations of the prior."""
 BEGUN, CLIMBED = 3, 5
@@ -116,9 +121,9 @@ def _drawn(
 
 
 def _believed_row(base: Fitted, ground: Ground) -> Array:
-    """Return the row (WIDTH,) of a ground whose place is fitted and whose mass and friction are as was believed."""
-    kept = np.isin(base.hypothesis.columns, list(KEPT))
-    return base.hypothesis.rows(np.where(kept, ground.coordinates, base.hypothesis.mean)[None])[0]
+    """Return the row (WIDTH,) of a ground as it is fitted, but with mass and friction as was believed."""
+    bent = np.isin(base.hypothesis.columns, list(BENT))
+    return base.hypothesis.rows(np.where(bent, base.hypothesis.mean, ground.coordinates)[None])[0]
 
 
 def _first_of(misfit: Array, among: NDArray[np.bool_]) -> NDArray[np.int64]:
