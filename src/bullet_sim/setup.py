@@ -13,6 +13,6 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["numpy", "pybullet", "pydantic", "pyyaml", "shapely"],
+    install_requires=["numpy", "opencv-python-headless", "pybullet", "pydantic", "pyyaml", "scipy", "shapely"],
     zip_safe=False,
 )

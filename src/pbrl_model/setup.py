@@ -13,11 +13,23 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["numpy", "scipy", "numba", "pymunk", "shapely", "arviz", "pydantic", "pyyaml", "h5netcdf"],
+    install_requires=[
+        "numpy",
+        "scipy",
+        "numba",
+        "pymunk",
+        "shapely",
+        "arviz",
+        "pydantic",
+        "pyyaml",
+        "h5netcdf",
+        "opencv-python-headless",
+    ],
     zip_safe=False,
     entry_points={
         "console_scripts": [
             "model_node = pbrl_model.ros.model_node:main",
+            "tag_detector_node = pbrl_model.ros.tag_detector_node:main",
         ],
     },
 )

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from pydantic import Field, model_validator
 from shapely.geometry import Point, Polygon
 
+from bullet_sim.camera_settings import CameraSettings
 from bullet_sim.catalogue import Body
 from bullet_sim.concealed.checks import check_concealed
 from bullet_sim.concealed.options import Concealed
@@ -31,6 +32,8 @@ from bullet_sim.settings import (
     parse_settings,
     read_settings,
 )
+
+TagSource = Literal["noise", "rendered"]
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
@@ -75,9 +78,11 @@ class Goal(Settings):
 
 
 class TagSettings(Settings):
-    """Overhead camera that reads tags; defaults are an estimate for one ceiling camera.
+    """Overhead cameras that read tags; defaults of the noise are an estimate for one ceiling camera.
 
     Attributes:
+        source: `noise`: poses with the errors below; `rendered`: pictures of `sensors.cameras`, in which tags are still
+            to be found. Then there is nothing to say here but rate and latency.
         rate: [Hz].
         sigma_xy: white noise of x and y [m].
         sigma_z: white noise of the height [m].
@@ -89,6 +94,7 @@ class TagSettings(Settings):
         bias_length: distance [m] over which that error changes.
     """
 
+    source: TagSource = "noise"
     rate: Annotated[float, Field(ge=0.1, le=200)] = 15.0
     sigma_xy: NonNegative = 0.003
     sigma_z: NonNegative = 0.006
@@ -98,6 +104,15 @@ class TagSettings(Settings):
     dropout: Fraction = 0.02
     bias: NonNegative = 0.008
     bias_length: Positive = 1.0
+
+    @model_validator(mode="after")
+    def _says_what_counts(self) -> Self:
+        more = sorted(self.model_fields_set - {"source", "rate", "latency"})
+        if self.source == "rendered" and more:
+            raise ValueError(
+                f"expected no {more[0]} where tags are rendered: errors come from the pictures; leave it out"
+            )
+        return self
 
 
 class WristSettings(Settings):
@@ -131,6 +146,7 @@ class Sensors(Settings):
 
     tags: TagSettings = TagSettings()
     wrist_ft: WristSettings = WristSettings()
+    cameras: CameraSettings = CameraSettings()
 
 
 class Scene(Settings):
@@ -229,6 +245,15 @@ def with_model(scene: Scene, path: Path, body: str | None = None) -> Scene:
         else:
             told[key] = {**told.get(key, {}), **value}
     return parse_settings({**scene.model_dump(exclude_unset=True), "concealed": told}, Scene, str(path))
+
+
+def with_tags(scene: Scene, source: TagSource) -> Scene:
+    """Return a scene whose tags come from `source`, at the rate and with the latency that it says already."""
+    if source == scene.sensors.tags.source:
+        return scene
+    said = scene.sensors.tags.model_dump(include={"rate", "latency"}, exclude_unset=True)
+    sensors = scene.sensors.model_copy(update={"tags": TagSettings(source=source, **said)})
+    return scene.model_copy(update={"sensors": sensors})
 
 
 def scene_folder() -> Path:

@@ -5,6 +5,7 @@ Used by the node, which publishes them, and by runs without middleware, which wr
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable
 from functools import lru_cache, singledispatch
 from typing import Any
@@ -25,12 +26,13 @@ from nav_msgs.msg import Odometry as OdometryMsg
 from numpy.typing import NDArray
 from pbrl_msgs.msg import Body, Grasp, Grasps, Scene
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import ColorRGBA, Header, String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from krang_sim.observations import (
+    CameraPicture,
     ClockTick,
     GraspState,
     JointStates,
@@ -186,6 +188,33 @@ def _(observation: TagReading) -> Messages:
 
 
 @_translate.register
+def _(observation: CameraPicture) -> Messages:
+    header = Header(stamp=stamp(observation.time), frame_id=observation.frame)
+    lines, width = observation.image.shape
+    image = Image(
+        header=header,
+        height=lines,
+        width=width,
+        encoding="mono8",
+        step=width,
+        data=array("B", observation.image.tobytes()),
+    )
+    k = observation.matrix
+    info = CameraInfo(
+        header=header,
+        height=lines,
+        width=width,
+        distortion_model="plumb_bob",
+        d=observation.distortion.tolist(),
+        k=k.ravel().tolist(),
+        r=np.eye(3).ravel().tolist(),
+        p=np.column_stack([k, np.zeros(3)]).ravel().tolist(),
+    )
+    name = f"/camera/{observation.frame}"
+    return [(f"{name}/camera_info", info), (f"{name}/image_raw", image)]
+
+
+@_translate.register
 def _(observation: Outlines) -> Messages:
     header = Header(stamp=stamp(observation.time), frame_id="world")
     markers = [
@@ -230,13 +259,19 @@ LATCHED = ("/tf_static", "/robot_description", "/scene", "/grasps")
 """Topics whose last message late subscribers get too: transient local, depth 1."""
 
 
-def message_types(bodies: tuple[str, ...]) -> dict[str, Callable[[], Any]]:
+def message_types(bodies: tuple[str, ...], cameras: int = 0) -> dict[str, Callable[[], Any]]:
     """List every topic the simulator publishes and its message class.
 
     Args:
         bodies: names of the bodies that wear a tag.
+        cameras: how many publish pictures; then somebody else finds the tags in them.
     """
-    tags = {f"/ar_tags/{name}/pose": PoseStamped for name in (*bodies, "left_gripper", "right_gripper")}
+    tags: dict[str, Callable[[], Any]] = {
+        f"/ar_tags/{name}/pose": PoseStamped for name in (*bodies, "left_gripper", "right_gripper")
+    }
+    if cameras:
+        tags = {f"/camera/overhead_{number}/image_raw": Image for number in range(cameras)}
+        tags |= {f"/camera/overhead_{number}/camera_info": CameraInfo for number in range(cameras)}
     return {
         "/clock": Clock,
         "/joint_states": JointState,

@@ -140,6 +140,34 @@ class TagReading:
 
 
 @dataclass(frozen=True)
+class CameraPicture:
+    """A picture of one overhead camera and what its calibration says.
+
+    Attributes:
+        time: when it was taken [s].
+        camera: number of the camera.
+        image: (height, width) grey levels.
+        matrix: (3, 3) of the lens [px].
+        distortion: (5,) of OpenCV, "plumb_bob".
+        position: (3,) [m] of its optical frame in `world`, as calibrated; messages have it in `/tf_static`.
+        quaternion: (4,) of that frame.
+    """
+
+    time: float
+    camera: int
+    image: NDArray[np.uint8]
+    matrix: Array
+    distortion: Array
+    position: Array
+    quaternion: Array
+
+    @property
+    def frame(self) -> str:
+        """Name of the camera and of its optical frame; a topic's names may not be plain numbers."""
+        return f"overhead_{self.camera}"
+
+
+@dataclass(frozen=True)
 class Outlines:
     """Known bodies drawn where their tags were last seen: pose (7,) position and quaternion, by name."""
 
@@ -158,6 +186,7 @@ Observation: TypeAlias = (
     | GraspState
     | WristReading
     | TagReading
+    | CameraPicture
     | Outlines
 )
 """Anything the simulator publishes."""

@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 
 from bullet_sim.client import Pose, yaw_quaternion
 from bullet_sim.concealed.sensing import tag_camera, wrist_sensor
+from bullet_sim.sensors import TagReading as SeenTag
 from bullet_sim.sensors import Ticker
 from bullet_sim.world import World
+from krang_sim.errors import KrangError
 from krang_sim.frames import RobotFrames
 from krang_sim.known import known_scene
 from krang_sim.observations import (
+    CameraPicture,
     ClockTick,
     GraspState,
     JointStates,
@@ -25,6 +28,7 @@ from krang_sim.observations import (
     WristReading,
 )
 from krang_sim.robot import JOINTS, SIDES, Krang, WheelOdometry, description_path
+from krang_sim.tag_cameras import ReadTags, TagCameras
 
 Array = NDArray[np.float64]
 
@@ -43,14 +47,30 @@ class Sensing:
         tagged: names of the bodies that wear a tag: those that can move.
     """
 
-    def __init__(self, world: World, robot: Krang, rng: Generator) -> None:
-        """Set the sensors up; each draws from a stream of its own, spawned from `rng`."""
+    def __init__(self, world: World, robot: Krang, rng: Generator, read_tags: ReadTags | None = None) -> None:
+        """Set the sensors up; each draws from a stream of its own, spawned from `rng`.
+
+        Args:
+            world: the room.
+            robot: in it.
+            rng: of all draws.
+            read_tags: finds tags in pictures, where the scene wants them rendered; None: pictures are published.
+
+        Raises:
+            SimError: rendered tags that cannot be.
+            KrangError: a reader of pictures, and no pictures.
+        """
+        rendered = world.scene.sensors.tags.source == "rendered"
+        if read_tags is not None and not rendered:
+            raise KrangError("sensors.tags.source: expected rendered for a reader of pictures, got noise")
         camera_rng, *wrist_rngs = rng.spawn(1 + len(SIDES))
         self._world, self._robot = world, robot
         self._known = known_scene(world.scene, 0.0)
         self._bodies = {body.name: body for body in self._known.bodies}
         self.tagged = tuple(body.name for body in self._known.bodies if body.movable)
-        self._camera = tag_camera(world.scene, camera_rng)
+        self._camera = (
+            TagCameras(world, self.tagged, camera_rng, read_tags) if rendered else tag_camera(world.scene, camera_rng)
+        )
         self._wrists = {
             side: wrist_sensor(world.scene, side, wrist_rng) for side, wrist_rng in zip(SIDES, wrist_rngs, strict=True)
         }
@@ -72,16 +92,22 @@ class Sensing:
             GraspState(0.0, ()),
         ]
 
+    @property
+    def cameras(self) -> int:
+        """How many cameras publish pictures."""
+        return len(self._camera.cameras) if isinstance(self._camera, TagCameras) else 0
+
     def _static_frames(self) -> Transforms:
-        """Give the fixed joints, and `odom` where the robot starts."""
+        """Give the fixed joints, `odom` where the robot starts, and the cameras where their calibration has them."""
         start = _planar_to_pose(np.array(self._world.scene.robot.pose), 0.0)
         positions, quaternions = self._frames.in_parents()
+        hung = self._camera.cameras if isinstance(self._camera, TagCameras) else ()
         return Transforms(
             0.0,
-            ("world", *[parent for parent, _ in self._frames.fixed]),
-            ("odom", *[child for _, child in self._frames.fixed]),
-            np.vstack([start[:3], positions]),
-            np.vstack([start[3:], quaternions]),
+            ("world", *[parent for parent, _ in self._frames.fixed], *["world"] * len(hung)),
+            ("odom", *[child for _, child in self._frames.fixed], *[camera.frame for camera in hung]),
+            np.vstack([start[:3], positions, *[camera.told.position for camera in hung]]),
+            np.vstack([start[3:], quaternions, *[camera.told.quaternion for camera in hung]]),
             static=True,
         )
 
@@ -134,12 +160,18 @@ class Sensing:
             for side, position, quaternion in zip(SIDES, positions, quaternions, strict=True):
                 tags[f"{side}_gripper"] = Pose(position, quaternion)
             self._camera.capture(time, tags)
-        seen: list[Observation] = []
-        for reading in self._camera.deliver(time):
-            seen.append(TagReading(reading.stamp, reading.name, reading.position, reading.quaternion))
-            if reading.name in self._bodies:
-                self._seen[reading.name] = np.concatenate([reading.position, reading.quaternion])
-        return seen
+        seen = [_observed(news) for news in self._camera.deliver(time)]
+        for reading in seen:
+            if isinstance(reading, TagReading) and reading.tag in self._bodies:
+                self._seen[reading.tag] = np.concatenate([reading.position, reading.quaternion])
+        return [*seen]
+
+
+def _observed(news: SeenTag | TagReading | CameraPicture) -> TagReading | CameraPicture:
+    """Give what a camera delivers as what is published."""
+    if isinstance(news, SeenTag):
+        return TagReading(news.stamp, news.name, news.position, news.quaternion)
+    return news
 
 
 def _planar_to_pose(pose: Array, height: float) -> Array:

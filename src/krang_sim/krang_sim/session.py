@@ -22,6 +22,7 @@ from krang_sim.observations import GraspState, Observation
 from krang_sim.postures import Posture, mirrored, posture
 from krang_sim.robot import BODY_JOINTS, SIDES, Krang
 from krang_sim.sensing import Sensing
+from krang_sim.tag_cameras import ReadTags
 
 OVERLAP = 0.005  # [m] a body that reaches further than this into the robot stands in its place
 
@@ -33,9 +34,12 @@ class KrangSession:
         world: the scene in Bullet.
         robot: the robot in it.
         tagged: names of the bodies that wear a tag.
+        cameras: how many overhead cameras give pictures; none where tags are made by their noise.
     """
 
-    def __init__(self, scene: Scene, *, seed: int, gui: bool = False, step: float = STEP) -> None:
+    def __init__(
+        self, scene: Scene, *, seed: int, gui: bool = False, step: float = STEP, read_tags: ReadTags | None = None
+    ) -> None:
         """Build the scene and put the robot into it.
 
         Args:
@@ -43,6 +47,7 @@ class KrangSession:
             seed: of every random draw. World and sensors draw from streams of their own.
             gui: open Bullet's window.
             step: physics step [s].
+            read_tags: finds tags in the pictures of a scene that has them rendered; None: pictures are given out.
 
         Raises:
             SimError: a scene that cannot be built, a body where the robot stands, an unknown posture, a bad step.
@@ -53,13 +58,13 @@ class KrangSession:
             self.world = World(self._client, scene, np.random.default_rng(world_seed))
             self.robot = Krang(self._client, scene.robot.pose, _start_posture(scene.robot.posture))
             self._check_start(scene)
-            self._sensing = Sensing(self.world, self.robot, np.random.default_rng(sensor_seed))
+            self._sensing = Sensing(self.world, self.robot, np.random.default_rng(sensor_seed), read_tags)
         except BaseException:
             self._client.close()
             raise
         if self._client.window is not None:
             self._aim(self._client.window, scene)
-        self.tagged = self._sensing.tagged
+        self.tagged, self.cameras = self._sensing.tagged, self._sensing.cameras
         self._commands = CommandWatchdog({"base": 2, "left": 7, "right": 7, "body": 2})
         self._grippers = Grippers(self.world, self.robot)
         self._news: list[Observation] = self._sensing.latched()

@@ -244,7 +244,7 @@ def bench(
         str,
         typer.Argument(
             help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose, calibration, concealed, "
-            "next-experiment or mismatch."
+            "tags, control, next-experiment or mismatch."
         ),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,

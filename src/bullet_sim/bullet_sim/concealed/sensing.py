@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numpy.random import Generator
 
+from bullet_sim.errors import SimError
 from bullet_sim.scene import Scene
 from bullet_sim.sensors import TagCamera, WristSensor
 
@@ -29,7 +30,15 @@ def wrist_sensor(scene: Scene, side: str, rng: Generator) -> WristSensor:
 
 
 def tag_camera(scene: Scene, rng: Generator) -> TagCamera:
-    """Make the overhead camera; tags are named after bodies, and `<side>_gripper`."""
+    """Make the overhead camera; tags are named after bodies, and `<side>_gripper`.
+
+    Raises:
+        SimError: the scene wants tags rendered, and this is the model of their noise.
+    """
+    if scene.sensors.tags.source != "noise":
+        raise SimError(
+            f"sensors.tags.source: expected noise here, got {scene.sensors.tags.source}; only Krang's room renders"
+        )
     concealed = scene.concealed
     return TagCamera(
         scene.sensors.tags,

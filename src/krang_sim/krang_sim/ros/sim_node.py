@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import rclpy
 from geometry_msgs.msg import Twist
@@ -29,7 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
 from bullet_sim.errors import SimError
-from bullet_sim.scene import load_scene, with_model
+from bullet_sim.scene import Scene, TagSource, load_scene, with_model, with_tags
 from krang_sim.errors import KrangError
 from krang_sim.messages import LATCHED, message_types, to_messages
 from krang_sim.robot import SIDES
@@ -46,6 +46,7 @@ SLIP = 0.25
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=100)
 COMMAND_QOS = QoSProfile(depth=1)
+PICTURE_QOS = QoSProfile(depth=2)  # a megabyte each
 
 
 class SimNode(Node):
@@ -61,14 +62,10 @@ class SimNode(Node):
     def __init__(self, stop: threading.Event) -> None:
         super().__init__("sim_node")
         self._stop = stop
-        scene, model, seed, gui = self._declare()
-        loaded = with_model(load_scene(scene), Path(model)) if model else load_scene(scene)
-        self.session = KrangSession(loaded, seed=seed, gui=gui)
-        types = message_types(self.session.tagged)
-        self._outputs = {
-            topic: self.create_publisher(kind, topic, LATCHED_QOS if topic in LATCHED else STREAM_QOS)
-            for topic, kind in types.items()
-        }
+        scene, seed, gui = self._declare()
+        self.session = KrangSession(scene, seed=seed, gui=gui)
+        types = message_types(self.session.tagged, self.session.cameras)
+        self._outputs = {topic: self.create_publisher(kind, topic, _quality(topic)) for topic, kind in types.items()}
         self._heard = 0
         self._last_command: float | None = None
         self._listen_to_commands()
@@ -77,10 +74,12 @@ class SimNode(Node):
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
 
-    def _declare(self) -> tuple[str, str, int, bool]:
-        """Declare every parameter; return scene, model, seed and gui."""
+    def _declare(self) -> tuple[Scene, int, bool]:
+        """Declare every parameter; return scene, seed and gui."""
         scene = declare(self, "scene", "locked_caster", "scene file, or the name of a scene of the workspace")
         model = declare(self, "model", "", "file of a learned model: the body of its name behaves so; empty: none")
+        text = "noise or rendered: pictures on /camera/overhead_<i> for tag_detector_node; empty: as the scene says"
+        tags = declare(self, "tags", "", text)
         seed = declare(self, "seed", 0, "seed of every random draw", (0, 2**31 - 1))
         gui = declare(self, "gui", False, "open Bullet's window")
         rate = "simulated seconds per second; 0: as fast as possible"
@@ -89,7 +88,10 @@ class SimNode(Node):
         lag = "at a rate other than 1: simulated seconds to run on after a command before waiting for the next"
         self._lag: float = declare(self, "command_lag", 0.02, lag, (0.0, 1.0))
         refuse_unknown(self)
-        return scene, model, seed, gui
+        if tags not in ("", *get_args(TagSource)):
+            raise KrangError(f"tags: expected {' or '.join(get_args(TagSource))}, got {tags!r}")
+        loaded = with_model(load_scene(scene), Path(model)) if model else load_scene(scene)
+        return with_tags(loaded, tags) if tags else loaded, seed, gui
 
     def _listen_to_commands(self) -> None:
         self.create_subscription(Twist, "/cmd_vel", self._command_base, COMMAND_QOS)
@@ -193,6 +195,13 @@ class SimNode(Node):
         self.session.close()
         self._spinner.remove_node(self)
         super().destroy_node()
+
+
+def _quality(topic: str) -> QoSProfile:
+    """Give the quality of service of what is published on a topic."""
+    if topic in LATCHED:
+        return LATCHED_QOS
+    return PICTURE_QOS if topic.startswith("/camera/") else STREAM_QOS
 
 
 def main() -> None:
