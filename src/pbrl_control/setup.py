@@ -5,7 +5,7 @@ NAME = "pbrl_control"
 setup(
     name=NAME,
     version="0.1.0",
-    description="Whole-body Jacobian control of what the robot holds; body_controller_node and push_node.",
+    description="Whole-body control of what the robot holds; body_controller_node and push_node.",
     license="BSD-3-Clause",
     packages=find_packages(),
     package_data={NAME: ["py.typed"]},
@@ -13,7 +13,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["numpy", "pin", "pydantic", "pyyaml"],
+    install_requires=["daqp", "numba", "numpy", "ompl", "pin", "pydantic", "pyyaml", "scipy", "shapely"],
     zip_safe=False,
     entry_points={
         "console_scripts": [

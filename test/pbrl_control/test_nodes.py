@@ -6,18 +6,20 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rclpy
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import Point, Twist, TwistStamped
+from pbrl_msgs.msg import Body, ObjectModel, ObjectModels, Scene
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Bool, Float64MultiArray, String
 
 from pbrl_control.kinematics import ARM_JOINTS, BODY_JOINTS, Posture
 from pbrl_control.ros.body_controller_node import BodyControllerNode
@@ -25,6 +27,7 @@ from pbrl_control.ros.conversions import twist_to_msg
 from pbrl_control.ros.push_node import PushNode
 from pbrl_control.ros.qos import COMMANDS, LATCHED
 from pbrl_control.types import PlanarTwist
+from pbrl_model.parameters import UNITS
 
 SPINS = 400  # turns of the executor before a test gives up
 
@@ -48,6 +51,11 @@ class World(Node):
         self.joints = self.create_publisher(JointState, "/joint_states", 10)
         self.description = self.create_publisher(String, "/robot_description", LATCHED)
         self.twist = self.create_publisher(TwistStamped, "/object_twist_command", COMMANDS)
+        self.emergency = self.create_publisher(Bool, "/emergency_stop", LATCHED)
+        self.reports: list[str] = []
+        self.create_subscription(
+            String, "/body_controller/status", lambda message: self.reports.append(message.data), LATCHED
+        )
 
     def tell(self, now: float, posture: Posture, twist: tuple[str, PlanarTwist] | None = None) -> None:
         """Say what time it is, where the joints are, and a command."""
@@ -62,9 +70,10 @@ class World(Node):
 
 
 @pytest.fixture
-def spin_with() -> Iterator[Callable[[type[Node]], tuple]]:
+def spin_with(request: pytest.FixtureRequest) -> Iterator[Callable[[type[Node]], tuple]]:
     """Give a function that makes a node and returns it, the world, and a spinner: `until(condition, act)`."""
     context_args = ["--ros-args", "-p", "use_sim_time:=true", "-p", "push_node:exit_when_done:=true"]
+    context_args += getattr(request, "param", [])
     rclpy.init(args=context_args, domain_id=1 + os.getpid() % 100)
     executor, nodes = SingleThreadedExecutor(), []
 
@@ -110,6 +119,44 @@ def test_controller_obeys_and_stops_when_commands_cease(spin_with, push_posture:
     assert len(world.base) - said <= 1, "with nothing commanded it leaves the drives to others"
 
 
+def moved(posture: Posture, turn: int) -> Posture:
+    """Return a posture that is not the same at every turn, as a robot's that moves."""
+    return replace(posture, left=posture.left + 1e-6 * turn)
+
+
+def test_an_emergency_stop_is_rest_until_it_is_lifted(spin_with, push_posture: Posture, root: Path) -> None:
+    _, world, until = spin_with(BodyControllerNode)
+    world.description.publish(String(data=(root / "urdf/krang/krang.urdf").read_text()))
+    forward, now = ("base", PlanarTwist(vx=0.3)), [0.0]
+
+    def drive(turn: int) -> None:
+        now[0] += 0.02
+        world.tell(now[0], moved(push_posture, round(now[0] / 0.02)), forward)
+
+    until(lambda: bool(world.base) and world.base[-1].linear.x > 0.05, drive)
+    world.emergency.publish(Bool(data=True))
+    until(lambda: world.base[-1].linear.x == 0.0 and bool(world.reports), drive)
+    assert "emergency stop" in world.reports[-1]
+    for turn in range(10):
+        drive(turn)
+    until(lambda: world.base[-1].linear.x == 0.0, drive)
+    world.emergency.publish(Bool(data=False))
+    until(lambda: world.base[-1].linear.x > 0.05, drive)
+    assert world.reports[-1] == "ok"
+
+
+def test_joint_positions_that_freeze_stop_the_robot(spin_with, push_posture: Posture, root: Path) -> None:
+    _, world, until = spin_with(BodyControllerNode)
+    world.description.publish(String(data=(root / "urdf/krang/krang.urdf").read_text()))
+    up = ("left_ft", PlanarTwist(vz=0.1))
+    until(
+        lambda: bool(world.reports) and "frozen" in world.reports[-1],
+        lambda turn: world.tell(0.02 * turn, push_posture, up),
+    )
+    assert world.reports[-1].startswith("joint positions: expected changes as the robot moves")
+    until(lambda: world.base[-1].linear.x == 0.0 and not any(world.right[-1].data), lambda turn: None)
+
+
 def test_push_without_a_scene_fails_with_a_sentence(spin_with, push_posture: Posture) -> None:
     node, world, until = spin_with(PushNode)
     until(
@@ -121,11 +168,33 @@ def test_push_without_a_scene_fails_with_a_sentence(spin_with, push_posture: Pos
     assert {message.header.frame_id for message in world.twists} == {"left_ft"}
 
 
+@pytest.mark.parametrize("spin_with", [["-p", "push_node:trajectory:=turn_about_caster"]], indirect=True)
+def test_a_trajectory_is_followed_as_the_learned_model_allows(spin_with, push_posture: Posture) -> None:
+    node, world, until = spin_with(PushNode)
+    models = world.create_publisher(ObjectModels, "/object_models", LATCHED)
+    scene = world.create_publisher(Scene, "/scene", LATCHED)
+    names = {"mass": 33.0, "wheel_x": -0.3, "wheel_y": -0.6, "wheel_theta": 0.0, "mu_x": 0.9, "mu_y": 0.9}
+    learned = ObjectModel(object="table_a", model_class="wheel", parameters=list(names), draws=1)
+    learned.units, learned.samples = [UNITS[name] for name in names], list(names.values())
+    models.publish(ObjectModels(models=[learned]))
+    until(lambda: node._learned is not None, lambda turn: world.tell(0.02 * turn, push_posture))
+    assert node._course.model is None, "its outline is not known yet"
+    corners = [Point(x=x, y=y) for x, y in ((-0.4, -0.7), (0.4, -0.7), (0.4, 0.7), (-0.4, 0.7))]
+    scene.publish(Scene(bodies=[Body(name="table_a", footprint=corners, height=0.77)]))
+    until(lambda: node._course.model is not None, lambda turn: world.tell(10.0 + 0.02 * turn, push_posture))
+    assert node._course.model.mass == 33.0
+    learned.samples = [-1.0, *learned.samples[1:]]
+    models.publish(ObjectModels(models=[learned]))
+    until(lambda: node._learned.samples[0] == -1.0, lambda turn: world.tell(20.0 + 0.02 * turn, push_posture))
+    assert node._course.model.mass == 33.0, "what has no mass is left aside"
+
+
 @pytest.mark.parametrize(
     ("module", "arguments", "complaint"),
     [
         ("push_node", ["-p", "plan:=no_such_plan"], "push plan: expected a path or one of"),
         ("push_node", ["-p", "plan:=3"], "plan: expected str"),
+        ("push_node", ["-p", "trajectory:=nowhere"], "trajectory: expected a path or one of straight_and_turn"),
         ("push_node", ["-p", "rate:=1"], "rate: expected 10 to 200"),
         ("push_node", ["-p", "plam:=turn_table"], "did you mean 'plan'?"),
         ("body_controller_node", ["-p", "settings:=no_such_file.yaml"], "expected a readable YAML file"),

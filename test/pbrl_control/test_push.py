@@ -7,9 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from pbrl_control.course import Course, CourseStep
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag
 from pbrl_control.push import GripperAnswer, Phase, PushCommand, PushExecutive
 from pbrl_control.push_plan import PushPlan
+from pbrl_control.types import Hold, PlanarTwist
 
 TABLE = BodyShape(np.array([[-0.375, -0.75], [0.375, -0.75], [0.375, 0.75], [-0.375, 0.75]]), 0.7775)
 FORWARD = np.array([0.0, 0.0, -np.sqrt(0.5), np.sqrt(0.5)])  # left gripper's +y along world x
@@ -50,9 +52,16 @@ def run(executive: PushExecutive, start: float, until: float, **percept: object)
     return command
 
 
-def at(phase: Phase) -> tuple[PushExecutive, float]:
+class Onwards:
+    """A course that has no end."""
+
+    def step(self, now: float, dt: float, percept: Percept, hold: Hold, forces: Mapping[str, float]) -> CourseStep:
+        return CourseStep(PlanarTwist(0.1), "onwards")
+
+
+def at(phase: Phase, course: Course | None = None) -> tuple[PushExecutive, float]:
     """Return an executive that has just come to a phase, and the time."""
-    executive, now, grips = PushExecutive(PLAN), 0.0, {}
+    executive, now, grips = PushExecutive(PLAN, course), 0.0, {}
     while executive.phase != phase:
         command = executive.tick(now, seen(now, grips=grips))
         for request in command.requests:
@@ -135,15 +144,13 @@ def test_a_failed_push_lets_go_before_it_says_so() -> None:
 @pytest.mark.parametrize("tag", ["table", "left_gripper"])
 @pytest.mark.parametrize("phase", [Phase.APPROACH, Phase.PUSH])
 def test_a_lost_tag_ends_it(phase: Phase, tag: str) -> None:
-    executive, now = at(phase)
+    executive, now = at(phase, Onwards())
     grips = HELD if phase == Phase.PUSH else {}
     old = seen(now, gap=0.3, grips=grips).tags[tag]
     for t in np.arange(now, now + PLAN.limits.tag_age + 0.3, 0.01):
         percept = seen(float(t), gap=0.3, grips=grips)
         if executive.phase != phase:
             break
-        executive._profile.segment = 0
-        executive._profile._elapsed = 0.0
         command = executive.tick(
             float(t), Percept(None, {**percept.tags, tag: old}, percept.wrenches, grips, percept.bodies)
         )

@@ -11,32 +11,24 @@ import difflib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import singledispatchmethod
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from std_msgs.msg import String
 
 from bullet_sim.scene import Scene
 from krang_sim.messages import stamp, to_messages
-from krang_sim.observations import (
-    GraspState,
-    JointStates,
-    KnownScene,
-    RobotDescription,
-    TagReading,
-    WristReading,
-)
+from krang_sim.observations import Observation
 from krang_sim.session import KrangSession
 from pbrl_bag.writer import BagWriter
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.files import new_folder_place, removed_afterwards
+from pbrl_bringup.manipulation import Manipulation
 from pbrl_bringup.paths import config_file
-from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
-from pbrl_control.loop import ControlLoop, LoopCommand
-from pbrl_control.percept import BodyShape, Grip, Percept, Tag
-from pbrl_control.push import GripperAnswer, GripperRequest, Phase, PushCommand
+from pbrl_bringup.rendered_tags import reader_of
+from pbrl_control.kinematics import SIDES
+from pbrl_control.loop import LoopCommand
+from pbrl_control.push import Phase, PushCommand
 from pbrl_control.push_plan import PushPlan
 from pbrl_control.ros.conversions import arm_to_msg, base_to_msg, twist_to_msg
 from pbrl_control.settings import ControllerSettings, load_section
@@ -93,7 +85,8 @@ def simulate_push(
     new_folder_place(bag)
     unfinished = bag.with_name(f".{bag.name}.part")
     settings = load_section(config_file("params", "body_controller"), ControllerSettings, "settings")
-    with KrangSession(scene, seed=seed, gui=gui) as session, removed_afterwards(unfinished):
+    reader = reader_of(scene)
+    with KrangSession(scene, seed=seed, gui=gui, read_tags=reader) as session, removed_afterwards(unfinished):
         # The name inside the bag is the folder's, so the folder is made under its own name elsewhere.
         with BagWriter(unfinished / bag.name, live=False) as writer:
             end = _run(_Run(session, plan, settings, writer), advance or (lambda time, phase: None))
@@ -151,93 +144,28 @@ def type_name(message: Any) -> str:
     return f"{package}/msg/{type(message).__name__}"
 
 
-class _Run:
+class _Run(Manipulation):
     """One session, its controller and its recording."""
 
     def __init__(self, session: KrangSession, plan: PushPlan, settings: ControllerSettings, writer: BagWriter) -> None:
-        self.session = session
-        self.plan = plan
-        self.last: PushCommand | None = None
-        self._settings = settings
+        super().__init__(session, plan, settings)
         self._writer = writer
-        self._loop: ControlLoop | None = None
-        self._posture: Posture | None = None
-        self._tags: dict[str, Tag] = {}
-        self._wrenches: dict[str, np.ndarray] = {}
-        self._grips: dict[str, Grip] = {}
-        self._bodies: dict[str, BodyShape] = {}
 
-    @property
-    def phase(self) -> str:
-        """Where the push is."""
-        return "start" if self.last is None else str(self.last.phase)
+    def noted(self, observation: Observation) -> None:
+        """Record what is observed."""
+        for topic, message in to_messages(observation):
+            self.record(topic, message)
 
-    def step(self) -> None:
-        """Advance the simulator by one step, record what it says, and control at each joint state."""
-        observations = self.session.step()
-        for observation in observations:
-            for topic, message in to_messages(observation):
-                self.record(topic, message)
-            self.perceive(observation)
-        if self._loop and self._posture and any(isinstance(each, JointStates) for each in observations):
-            percept = Percept(
-                self._posture, dict(self._tags), dict(self._wrenches), dict(self._grips), dict(self._bodies)
-            )
-            self.obey(self._loop.tick(self.session.time, percept))
+    def commanded(self, command: LoopCommand) -> None:
+        """Record a command as the nodes publish it."""
+        if self.last is None or command.push.phase != self.last.phase:
+            self.record("/push/status", String(data=status_text(command.push)))
+        for target, twist in command.push.twists.items():
+            self.record("/object_twist_command", twist_to_msg(target, twist, stamp(self.session.time)))
+        self.record("/cmd_vel", base_to_msg(command.body.base_v, command.body.base_w))
+        for side in SIDES:
+            self.record(f"/{side}_arm_velocity_controller/commands", arm_to_msg(command.body.arm(side)))
 
     def record(self, topic: str, message: Any) -> None:
         """Write one message at the present time."""
         self._writer.write(topic, type_name(message), message, round(self.session.time * 1e9))
-
-    def obey(self, command: LoopCommand) -> None:
-        """Send a command to the robot, record it as its nodes publish it, and carry out the grippers' requests."""
-        if self.last is None or command.push.phase != self.last.phase:
-            self.record("/push/status", String(data=status_text(command.push)))
-        self.last = command.push
-        for target, twist in command.push.twists.items():
-            self.record("/object_twist_command", twist_to_msg(target, twist, stamp(self.session.time)))
-        self.session.command_base(command.body.base_v, command.body.base_w)
-        self.record("/cmd_vel", base_to_msg(command.body.base_v, command.body.base_w))
-        for side in SIDES:
-            self.session.command_arm(side, command.body.arm(side).tolist())
-            self.record(f"/{side}_arm_velocity_controller/commands", arm_to_msg(command.body.arm(side)))
-        for request in command.push.requests:
-            self._answer(request)
-
-    def _answer(self, request: GripperRequest) -> None:
-        assert self._loop is not None
-        if request.action == "grasp":
-            outcome = self.session.grasp(request.side, request.object)
-        else:
-            outcome = self.session.release(request.side)
-        self._loop.answer(
-            GripperAnswer(request.action, request.side, outcome.success, outcome.message, outcome.distance)
-        )
-
-    @singledispatchmethod
-    def perceive(self, observation: object) -> None:
-        """Take in what the controller uses; the rest of the observations is only recorded."""
-
-    @perceive.register
-    def _(self, observation: RobotDescription) -> None:
-        self._loop = ControlLoop(RobotKinematics(observation.urdf), self.plan, self._settings)
-
-    @perceive.register
-    def _(self, observation: JointStates) -> None:
-        self._posture = Posture.from_joint_states(observation.names, observation.position.tolist())
-
-    @perceive.register
-    def _(self, observation: TagReading) -> None:
-        self._tags[observation.tag] = Tag(observation.time, observation.position, observation.quaternion)
-
-    @perceive.register
-    def _(self, observation: WristReading) -> None:
-        self._wrenches[observation.side] = np.concatenate([observation.force, observation.torque])
-
-    @perceive.register
-    def _(self, observation: GraspState) -> None:
-        self._grips = {hold.gripper: Grip(hold.object, hold.contact_point) for hold in observation.holds}
-
-    @perceive.register
-    def _(self, observation: KnownScene) -> None:
-        self._bodies = {body.name: BodyShape(body.footprint, body.height) for body in observation.bodies}

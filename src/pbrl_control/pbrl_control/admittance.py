@@ -13,7 +13,7 @@ import numpy as np
 
 from pbrl_control.kinematics import APPROACH, GRIP, GripperState
 from pbrl_control.planar import Array, cross
-from pbrl_control.settings import ComplianceAxis, ComplianceSettings
+from pbrl_control.settings import ComplianceAxis, ComplianceSettings, ProgramSettings
 
 
 class WrenchBias:
@@ -59,18 +59,27 @@ def grip_wrench(side: str, gripper: GripperState, wrench: Array) -> Array:
 
 
 class AxisCompliance:
-    """One axis: gives way to a force, comes back to its home."""
+    """One axis: gives way to a force, and comes back by and by from where it gave way to.
 
-    def __init__(self, settings: ComplianceAxis) -> None:
+    What is come back from is what this axis gave way itself, not how far the gripper is from some place: base and
+    arms may carry it wherever the task is, and the compliance neither knows nor resists.
+
+    Args:
+        settings: of the axis.
+        most: speed that it adds [m/s or rad/s].
+    """
+
+    def __init__(self, settings: ComplianceAxis, most: float) -> None:
         self._settings = settings
+        self._most = most
         self._slow = 0.0
+        self._given = 0.0
 
-    def step(self, force: float, displacement: float, dt: float) -> float:
+    def step(self, force: float, dt: float) -> float:
         """Return the velocity [m/s or rad/s] that yields to the force the object exerts on the gripper.
 
         Args:
             force: [N or N m].
-            displacement: from the home of the grip [m or rad].
             dt: time since the last step [s].
         """
         settings = self._settings
@@ -78,30 +87,55 @@ class AxisCompliance:
         fast = felt / settings.damping
         if settings.yielding is not None:
             self._slow += dt * (fast / settings.yielding - self._slow / settings.leak)
-        return fast + self._slow - settings.centring * displacement
+        velocity = fast + self._slow - settings.centring * self._given
+        velocity = min(max(velocity, -self._most), self._most)
+        self._given += dt * (velocity - (self._given / settings.forget if settings.forget is not None else 0.0))
+        return velocity
 
 
 class Admittance:
-    """Compliance of one grip in its planar axes, from the moment it closed."""
+    """Compliance of one grip in its planar axes, from the moment it closed.
+
+    Attributes:
+        home: (3,) where the gripper was in `base` when it closed [m, rad].
+        height: of the plates then [m].
+    """
 
     def __init__(self, settings: ComplianceSettings, home: Array, height: float) -> None:
         self.home = home
         self.height = height
-        self._settings = settings
         axes = (settings.longitudinal, settings.lateral, settings.yaw, settings.vertical)
-        self._axes = tuple(AxisCompliance(axis) for axis in axes)
+        most = (settings.speed, settings.speed, settings.yaw_rate, settings.speed)
+        self._axes = tuple(AxisCompliance(axis, top) for axis, top in zip(axes, most, strict=True))
 
-    def step(self, wrench: Array, displacement: Array, dt: float) -> tuple[Array, float]:
+    def step(self, wrench: Array, dt: float) -> tuple[Array, float]:
         """Return the planar twist (3,) in gripper axes and the vertical velocity that compliance adds.
 
         Args:
             wrench: (4,) as of `grip_wrench`.
-            displacement: (3,) of the gripper from its home, in its own axes [m, rad].
             dt: time since the last step [s].
         """
-        away = np.append(displacement, 0.0)
-        pairs = zip(self._axes, wrench, away, strict=True)
-        raw = np.array([axis.step(float(force), float(way), dt) for axis, force, way in pairs])
-        speed, rate = self._settings.speed, self._settings.yaw_rate
-        limited = np.clip(raw, [-speed, -speed, -rate, -speed], [speed, speed, rate, speed])
-        return limited[:3], float(limited[3])
+        vx, vy, omega, lift = (axis.step(force, dt) for axis, force in zip(self._axes, wrench.tolist(), strict=True))
+        return np.array([vx, vy, omega]), lift
+
+
+class ForceGovernor:
+    """How fast a gripper may go against the force that it feels: as fast as ever, until the force is past its limit.
+
+    Args:
+        settings: limit and rates.
+        speed: that is as fast as ever [m/s].
+    """
+
+    def __init__(self, settings: ProgramSettings, speed: float) -> None:
+        self._settings = settings
+        self._speed = speed
+        self._share = 1.0
+
+    def step(self, force: Array, dt: float) -> tuple[Array, float]:
+        """Return the unit vector (2,) against a horizontal force (2,) [N], and the speed along it [m/s]."""
+        strong = math.hypot(force[0], force[1])
+        beyond = strong / self._settings.grip_force - 1.0
+        rate = -self._settings.grip_slow * beyond if beyond > 0.0 else self._settings.grip_resume
+        self._share = min(max(self._share + rate * dt, 0.0), 1.0)
+        return (-force / strong if strong > 0.0 else np.zeros(2)), self._speed * self._share

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrl_control.edges import EdgePoint, nearest_edge
+from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.kinematics import GRIP, TIP
 from pbrl_control.percept import BodyShape, Percept, gripper_tag, object_planar, plates_planar
 from pbrl_control.planar import Array, rotation, wrap
-from pbrl_control.push_plan import PushPlan
 from pbrl_control.types import PlanarTwist, gripper_frame
 
 GAIN = 1.2  # [1/s] error to velocity
@@ -40,7 +40,7 @@ class GripError:
 class Approacher:
     """Servoes the grippers of a plan to their places on the object's edge."""
 
-    def __init__(self, plan: PushPlan, shape: BodyShape) -> None:
+    def __init__(self, plan: GraspPlan, shape: BodyShape) -> None:
         self._plan = plan
         self._edges: dict[str, EdgePoint] = {
             grip.gripper: nearest_edge(shape.footprint, np.array(grip.point)) for grip in plan.grips

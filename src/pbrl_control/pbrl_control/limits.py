@@ -1,74 +1,71 @@
-"""The last gate before the drives: whatever was computed, no command leaves that breaks a limit."""
+"""The last gate before the drives: whatever was computed, no command leaves that breaks a limit.
+
+A body velocity is (base forward [m/s], base yaw [rad/s], left arm (7,), right arm (7,) [rad/s]).
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from pbrl_control.kinematics import JointLimits
+from pbrl_control.kinematics import SIDES, JointLimits
+from pbrl_control.limits_kernel import velocity_range
 from pbrl_control.planar import Array
 from pbrl_control.settings import ArmSettings, BaseSettings
 
+WIDTH = 16  # numbers in a body velocity
+ARMS = slice(2, WIDTH)
+LONGEST = 0.1  # [s] period that a command may have to last
 
-class BaseGate:
-    """Bounds speed, yaw rate and their changes; keeps the last command."""
 
-    def __init__(self, settings: BaseSettings) -> None:
-        self._settings = settings
-        self.last = np.zeros(2)
+class BodyGate:
+    """Bounds speeds, their changes and the positions they lead to; keeps the last command.
+
+    Args:
+        base: of the differential base.
+        arm: of either arm.
+        joints: of both arms, from the robot's description.
+    """
+
+    def __init__(self, base: BaseSettings, arm: ArmSettings, joints: Mapping[str, JointLimits]) -> None:
+        self.last = np.zeros(WIDTH)
+        both = [joints[side] for side in SIDES]
+        margin = arm.joint_margin
+        self._lower = np.concatenate([each.lower + margin for each in both])
+        self._upper = np.concatenate([each.upper - margin for each in both])
+        speeds = [np.array([base.speed, base.yaw_rate]), *(arm.velocity_fraction * each.velocity for each in both)]
+        self._ceiling = np.concatenate(speeds)
+        self._change = np.array([base.acceleration, base.yaw_acceleration, *[arm.acceleration] * 14])
 
     def stop(self) -> None:
-        """Forget the last command: the base was told to stand."""
-        self.last = np.zeros(2)
+        """Forget the last command: the body was told to stand."""
+        self.last = np.zeros(WIDTH)
 
-    def preview(self, wish: Array, dt: float) -> Array:
-        """Return the (2,) forward speed and yaw rate nearest to the wish that limits allow now."""
-        settings = self._settings
-        change = np.array([settings.acceleration, settings.yaw_acceleration]) * dt
-        ceiling = np.array([settings.speed, settings.yaw_rate])
-        return np.clip(np.clip(wish, self.last - change, self.last + change), -ceiling, ceiling)
+    def range(self, joints: Array, dt: float) -> tuple[Array, Array]:
+        """Return lowest and highest body velocity (16,) that may be sent now.
 
-    def commit(self, velocity: Array) -> Array:
-        """Remember what is sent, bounded once more, and return it."""
-        ceiling = np.array([self._settings.speed, self._settings.yaw_rate])
-        self.last = np.clip(np.where(np.isfinite(velocity), velocity, 0.0), -ceiling, ceiling)
+        A joint's speed towards its stop is one from which its acceleration limit still brakes in time, a
+        period of `LONGEST` later. Where a joint is past its margin it may not go on, however fast it was.
+
+        Args:
+            joints: (14,) positions, left then right [rad].
+            dt: period since the last command [s].
+        """
+        low, high = np.empty(WIDTH), np.empty(WIDTH)
+        velocity_range(self.last, joints, self._lower, self._upper, self._ceiling, self._change, LONGEST, dt, low, high)
+        return low, high
+
+    def commit(self, velocity: Array, low: Array, high: Array) -> Array:
+        """Remember what is sent and return it: within the range, or rest where it is not finite."""
+        if math.isfinite(velocity.sum()):
+            self.last = np.minimum(np.maximum(velocity, low), high)
+        else:
+            self.stop()
         return self.last
 
 
-class ArmGate:
-    """Bounds one arm's joint velocities, their changes, and the positions they lead to."""
-
-    def __init__(self, limits: JointLimits, settings: ArmSettings) -> None:
-        self._limits = limits
-        self._settings = settings
-        self._last = np.zeros(7)
-
-    def stop(self) -> None:
-        """Forget the last command: the arm was told to stand."""
-        self._last = np.zeros(7)
-
-    def commit(self, velocity: Array, joints: Array, dt: float) -> Array:
-        """Return the (7,) velocities to send [rad/s], given the joints' positions [rad] and the period [s].
-
-        A change larger than the acceleration limit is shortened as a vector, so that the gripper keeps its
-        direction; position and velocity limits then hold whatever the direction.
-        """
-        if not np.isfinite(velocity).all():
-            self.stop()
-            return self._last
-        change = velocity - self._last
-        largest = float(np.abs(change).max())
-        allowed = self._settings.acceleration * dt
-        slewed = self._last + change * (allowed / largest if largest > allowed else 1.0)
-        ceiling = self._limits.velocity
-        period = max(dt, 1e-3)
-        low = np.clip((self._limits.lower - joints) / period, -ceiling, 0.0)
-        high = np.clip((self._limits.upper - joints) / period, 0.0, ceiling)
-        self._last = np.clip(slewed, low, high)
-        return self._last
-
-
 def usable_period(dt: float) -> bool:
-    """Say whether a control period makes sense: finite, positive, not over a tenth of a second."""
-    return math.isfinite(dt) and 0.0 < dt <= 0.1
+    """Say whether a control period makes sense: finite, positive, not over `LONGEST`."""
+    return math.isfinite(dt) and 0.0 < dt <= LONGEST

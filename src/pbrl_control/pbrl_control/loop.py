@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pbrl_control.controller import BodyController
+from pbrl_control.course import Course
 from pbrl_control.errors import ControlError
+from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.kinematics import RobotKinematics
 from pbrl_control.percept import Percept, holds_of
 from pbrl_control.push import GripperAnswer, PushCommand, PushExecutive
-from pbrl_control.push_plan import PushPlan
 from pbrl_control.settings import ControllerSettings
 from pbrl_control.types import BodyCommand, BodyState
 
@@ -35,11 +36,18 @@ class ControlLoop:
         kinematics: of the robot.
         plan: the push.
         settings: of the body controller.
+        course: what the object does while it is held; None: the segments of a push plan.
     """
 
-    def __init__(self, kinematics: RobotKinematics, plan: PushPlan, settings: ControllerSettings | None = None) -> None:
+    def __init__(
+        self,
+        kinematics: RobotKinematics,
+        plan: GraspPlan,
+        settings: ControllerSettings | None = None,
+        course: Course | None = None,
+    ) -> None:
         self.controller = BodyController(kinematics, settings or ControllerSettings())
-        self.executive = PushExecutive(plan)
+        self.executive = PushExecutive(plan, course)
         self._last: float | None = None
 
     def tick(self, now: float, percept: Percept) -> LoopCommand:

@@ -38,14 +38,16 @@ def inverse(a: Array) -> Array:
 
 def turn(twist: Array, theta: float) -> Array:
     """Return the same twist at the same point, in axes of the parent: theta is the old axes' yaw there."""
-    vx, vy = rotation(theta) @ twist[:2]
-    return np.array([vx, vy, twist[2]])
+    c, s = math.cos(theta), math.sin(theta)
+    vx, vy, omega = twist
+    return np.array([c * vx - s * vy, s * vx + c * vy, omega])
 
 
 def shift(twist: Array, lever: Array) -> Array:
     """Return the twist at the point `lever` (2,) [m] away from the point it was given at, same body, same axes."""
-    omega = twist[2]
-    return np.array([twist[0] - omega * lever[1], twist[1] + omega * lever[0], omega])
+    vx, vy, omega = twist
+    x, y = lever
+    return np.array([vx - omega * y, vy + omega * x, omega])
 
 
 def yaw_of(quaternion: Array) -> float:

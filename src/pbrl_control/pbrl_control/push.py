@@ -1,4 +1,4 @@
-"""The push executive: drive up, grasp, push by segments, release. A pure state machine, time is given."""
+"""The push executive: drive up, grasp, move by a course, release. A pure state machine, time is given."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 
 from pbrl_control.admittance import WrenchBias
 from pbrl_control.approach import Approacher
+from pbrl_control.course import Course, SegmentCourse
 from pbrl_control.errors import ControlError
+from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.percept import Percept, gripper_tag, holds_of
-from pbrl_control.profile import TwistProfile
 from pbrl_control.push_plan import PushPlan
 from pbrl_control.types import Hold, PlanarTwist, gripper_frame
 
@@ -77,18 +78,22 @@ class PushCommand:
 
 
 class PushExecutive:
-    """Runs one push plan.
+    """Runs one plan from drive-up to release.
 
     Args:
-        plan: what to do.
+        plan: what to grasp, and how.
+        course: what the object does while it is held; None: the segments of a push plan.
+
+    Raises:
+        ControlError: there is neither a course nor a push plan.
     """
 
-    def __init__(self, plan: PushPlan) -> None:
+    def __init__(self, plan: GraspPlan, course: Course | None = None) -> None:
         self.plan = plan
+        self._course = course if course is not None else _segments_of(plan)
         self.phase = Phase.APPROACH
         self._sides: list[str] = [grip.gripper for grip in plan.grips]
         self._approacher: Approacher | None = None
-        self._profile = TwistProfile(plan)
         self._bias: dict[str, WrenchBias] = {side: WrenchBias(0.3) for side in self._sides}
         self._answers: dict[str, GripperAnswer] = {}
         self._asked = False
@@ -185,12 +190,12 @@ class PushExecutive:
         self._check_tags(now, percept)
         hold = self._check_grip(now, percept)
         self._check_force(now, percept)
-        twist = self._profile.step(dt, hold)
-        if self._profile.finished:
+        forces = {side: self._force(side, percept) for side in self._sides}
+        step = self._course.step(now, dt, percept, hold, forces)
+        if step.finished:
             self._enter(Phase.RELEASE, now)
-            return self._rest("pushed", percept)
-        where = f"segment {self._profile.segment + 1} of {len(self.plan.segments)}"
-        return PushCommand(self.phase, where, {self.plan.object: PlanarTwist(*map(float, twist))})
+            return self._rest(step.status, percept)
+        return PushCommand(self.phase, step.status, {self.plan.object: step.twist})
 
     def _release(self, now: float, dt: float, percept: Percept) -> PushCommand:
         if now - self._since < self.plan.settle and not self._failure:
@@ -289,3 +294,9 @@ class PushExecutive:
         """Return the horizontal force at a gripper [N]; its z axis is the vertical, plates are kept level."""
         raw = percept.wrenches.get(side)
         return 0.0 if raw is None else float(np.hypot(*self._bias[side].remove(raw)[:2]))
+
+
+def _segments_of(plan: GraspPlan) -> Course:
+    if isinstance(plan, PushPlan):
+        return SegmentCourse(plan)
+    raise ControlError(f"plan {plan.name}: expected a course beside a plan without segments, got none")

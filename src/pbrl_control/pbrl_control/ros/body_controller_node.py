@@ -1,7 +1,8 @@
 """Node around `BodyController`: /object_twist_command in, /cmd_vel and arm velocities out.
 
 It ticks with every /joint_states message, so at that topic's rate and on its clock, simulated or not. When
-joint states cease nothing is sent any more, and base and arms stop by their own watchdogs.
+joint states cease nothing is sent any more, and base and arms stop by their own watchdogs. While /emergency_stop
+(std_msgs/Bool) is true the robot rests, whatever is commanded; /body_controller/status says why it rests.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import rclpy
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, WrenchStamped
@@ -17,14 +19,14 @@ from pbrl_msgs.msg import Grasps, Scene
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Bool, Float64MultiArray, String
 
 from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.stopping import init_until_signal, spin_until
 from pbrl_control.controller import BodyController
 from pbrl_control.errors import ControlError
-from pbrl_control.kinematics import SIDES, RobotKinematics
+from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
 from pbrl_control.percept import Grip, Percept, Tag, gripper_tag, holds_of
 from pbrl_control.planar import Array
 from pbrl_control.ros.conversions import (
@@ -38,9 +40,13 @@ from pbrl_control.ros.conversions import (
     wrench_from_msg,
 )
 from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
+from pbrl_control.sensor_watch import SensorWatch
 from pbrl_control.settings import ControllerSettings, load_section
 from pbrl_control.types import BodyCommand, BodyState
 from pbrl_control.watchdog import Watchdog
+
+JOINTS = "joint positions"
+STIRS = 0.02  # [rad/s] of a joint, at which its position has to change
 
 
 class BodyControllerNode(Node):
@@ -53,12 +59,15 @@ class BodyControllerNode(Node):
         self._settings = load_section(Path(path) if path else _installed_settings(), ControllerSettings, "settings")
         self._controller: BodyController | None = None
         self._watchdog = Watchdog(self._settings.timeout)
+        self._watch = SensorWatch(self._settings.watch)
+        self._emergency = False
         self._wrenches: dict[str, Array] = {}
         self._grips: dict[str, Grip] = {}
         self._tags: dict[str, Tag] = {}
         self._tag_topics: set[str] = set()
         self._last: float | None = None
         self._moving = False
+        self._in_motion = self._arms_in_motion = False
         self._report = ""
         self._create_publishers()
         self._create_subscriptions()
@@ -77,6 +86,7 @@ class BodyControllerNode(Node):
         self.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
         self.create_subscription(Grasps, "/grasps", self._on_grasps, LATCHED)
         self.create_subscription(TwistStamped, "/object_twist_command", self._on_twist, COMMANDS)
+        self.create_subscription(Bool, "/emergency_stop", self._on_emergency, LATCHED)
         for side in SIDES:
             self.create_subscription(WrenchStamped, f"/wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
             self._listen_to_tag(gripper_tag(side))
@@ -105,11 +115,16 @@ class BodyControllerNode(Node):
         target, twist = twist_from_msg(message)
         self._watchdog.feed(self._now(), target, twist)
 
+    def _on_emergency(self, message: Bool) -> None:
+        self._emergency = bool(message.data)
+
     def _on_wrench(self, side: str, message: WrenchStamped) -> None:
-        self._wrenches[side] = wrench_from_msg(message)
+        wrench = self._wrenches[side] = wrench_from_msg(message)
+        self._watch.feed(_wrench_stream(side), self._now(), wrench, moving=self._in_motion)
 
     def _on_tag(self, name: str, message: PoseStamped) -> None:
-        self._tags[name] = tag_from_msg(message)
+        tag = self._tags[name] = tag_from_msg(message)
+        self._watch.feed(_tag_stream(name), self._now(), np.array([tag.time]), moving=self._in_motion)
 
     def _on_joints(self, message: JointState) -> None:
         stamp = seconds(message.header.stamp)
@@ -121,12 +136,26 @@ class BodyControllerNode(Node):
         """Return what to send; None where nobody commands anything."""
         try:
             twists = self._watchdog.current(self._now())
+            if self._emergency:
+                return controller.stand("emergency stop: /emergency_stop is true")
             posture = posture_from_msg(message)
+            lost = self._lost_stream(posture) if twists else ""
+            if lost:
+                return controller.stand(lost)
             holds = holds_of(Percept(posture, self._tags, self._wrenches, self._grips))
             command = controller.tick(BodyState(posture), twists, holds, self._wrenches, dt)
         except ControlError as error:
             return BodyCommand(report=str(error))
         return command if twists or command.report else None
+
+    def _lost_stream(self, posture: Posture) -> str:
+        """Return which stream that is needed cannot be trusted, and why; empty where all can."""
+        now = self._now()
+        self._watch.feed(JOINTS, now, posture.vector(), moving=self._arms_in_motion)
+        needed = [JOINTS]
+        for side, grip in self._grips.items():
+            needed += [_wrench_stream(side), _tag_stream(grip.object), _tag_stream(gripper_tag(side))]
+        return self._watch.complaint(now, needed)
 
     def _send(self, command: BodyCommand | None) -> None:
         """Publish a command; when commands cease, one that stops everything, and then leave the drives alone."""
@@ -134,6 +163,8 @@ class BodyControllerNode(Node):
             return
         self._moving = command is not None
         command = command or BodyCommand()
+        self._arms_in_motion = any(np.abs(command.arm(side)).max() > STIRS for side in SIDES)
+        self._in_motion = self._arms_in_motion or command.base_v != 0.0 or command.base_w != 0.0
         self._base.publish(base_to_msg(command.base_v, command.base_w))
         for side in SIDES:
             self._arms[side].publish(arm_to_msg(command.arm(side)))
@@ -145,6 +176,14 @@ class BodyControllerNode(Node):
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9
+
+
+def _wrench_stream(side: str) -> str:
+    return f"wrench of the {side} gripper"
+
+
+def _tag_stream(name: str) -> str:
+    return f"tag {name!r}"
 
 
 def _installed_settings() -> Path:

@@ -1,4 +1,8 @@
-"""Node around `PushExecutive`: runs one push plan; /push/status says where it is."""
+"""Node around `PushExecutive`: one push plan, or an object moved along a trajectory; /push/status says where it is.
+
+With `trajectory` the object is grasped, moved as /object_models says that it can be moved, and let go. What has been
+learned of it when the grip closes counts; without a model the trajectory is followed as it is wanted.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ from functools import partial
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
-from pbrl_msgs.msg import Grasps, Scene
+from pbrl_msgs.msg import Grasps, ObjectModel, ObjectModels, Scene
 from pbrl_msgs.srv import GraspObject, ReleaseObject
 from rclpy.client import Client
 from rclpy.executors import ExternalShutdownException
@@ -18,6 +22,7 @@ from std_msgs.msg import String
 from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.stopping import init_until_signal, spin_until
+from pbrl_control.constraints.belief import ClassBelief
 from pbrl_control.errors import ControlError
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag
 from pbrl_control.planar import Array
@@ -25,10 +30,14 @@ from pbrl_control.push import GripperAnswer, GripperRequest, Phase, PushCommand,
 from pbrl_control.push_plan import load_plan
 from pbrl_control.ros.conversions import bodies_from_msg, grips_from_msg, tag_from_msg, twist_to_msg, wrench_from_msg
 from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
+from pbrl_control.trajectories.course import TrajectoryCourse
+from pbrl_control.trajectories.trajectory_plan import load_trajectory
+from pbrl_model.errors import ModelError
+from pbrl_model.ros.conversions import posterior_from_msg
 
 
 class PushNode(Node):
-    """Drives up to an object, grasps, pushes and releases it, as a plan says.
+    """Drives up to an object, grasps, moves and releases it, as a plan says.
 
     Attributes:
         ended: completes with the last command when the push has ended and `exit_when_done` is set.
@@ -37,15 +46,25 @@ class PushNode(Node):
     def __init__(self) -> None:
         super().__init__("push_node")
         plan = declare(self, "plan", "turn_table", "name of a plan in config/params/pushes, or a path")
+        trajectory = declare(
+            self, "trajectory", "", "in place of a plan: name of one in config/params/trajectories, or a path"
+        )
         self._exit = declare(self, "exit_when_done", False, "end with exit code 0 when done, 1 when failed")
         rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (10.0, 200.0))
         refuse_unknown(self)
-        self._executive = PushExecutive(load_plan(plan))
+        self._course: TrajectoryCourse | None = None
+        if trajectory:
+            wanted = load_trajectory(trajectory)
+            self._course = TrajectoryCourse(wanted)
+            self._executive = PushExecutive(wanted, self._course)
+        else:
+            self._executive = PushExecutive(load_plan(plan))
         self.ended: Future = Future()
         self._tags: dict[str, Tag] = {}
         self._wrenches: dict[str, Array] = {}
         self._grips: dict[str, Grip] = {}
         self._bodies: dict[str, BodyShape] = {}
+        self._learned: ObjectModel | None = None
         self._phase = ""
         self._subscribe()
         self._status = self.create_publisher(String, "/push/status", LATCHED)
@@ -60,6 +79,8 @@ class PushNode(Node):
         plan = self._executive.plan
         self.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
         self.create_subscription(Grasps, "/grasps", self._on_grasps, LATCHED)
+        if self._course is not None:
+            self.create_subscription(ObjectModels, "/object_models", self._on_models, LATCHED)
         for side in (grip.gripper for grip in plan.grips):
             self.create_subscription(WrenchStamped, f"/wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
         for name in (plan.object, *(gripper_tag(grip.gripper) for grip in plan.grips)):
@@ -67,6 +88,27 @@ class PushNode(Node):
 
     def _on_scene(self, message: Scene) -> None:
         self._bodies = bodies_from_msg(message)
+        self._take_model()
+
+    def _on_models(self, message: ObjectModels) -> None:
+        own = [model for model in message.models if model.object == self._executive.plan.object]
+        self._learned = own[-1] if own else self._learned
+        self._take_model()
+
+    def _take_model(self) -> None:
+        """Act on what was learned of the object, once its outline is known too."""
+        name = self._executive.plan.object
+        shape, learned = self._bodies.get(name), self._learned
+        if self._course is None or shape is None or learned is None:
+            return
+        try:
+            belief = ClassBelief.of(posterior_from_msg(learned), shape.footprint)
+        except (ControlError, ModelError) as error:
+            self.get_logger().error(f"model of {name!r} is left aside: {error}")
+            return
+        self._course.model = belief.model
+        share = belief.probabilities[belief.model_class]
+        self.get_logger().info(f"{name} is taken as {belief.model_class} ({100 * share:.0f} % of the draws)")
 
     def _on_grasps(self, message: Grasps) -> None:
         self._grips = grips_from_msg(message)

@@ -1,0 +1,32 @@
+"""Gains, tolerances and patience of the path tracker and the localizer."""
+
+from __future__ import annotations
+
+from pbrl_control.settings import NotNegative, Positive, Section
+
+
+class TrackerSettings(Section):
+    """How a path is followed, and what ends it."""
+
+    recovery: Positive = 0.15  # [m] over which the base comes back to its line by a factor e
+    reached: Positive = 0.004  # [m] before the end of a leg at which it counts as driven
+    aligned: Positive = 0.004  # [rad] of heading error at which a turn counts as done
+    turn_again: Positive = 0.35  # [rad] of heading error at which the base stops driving and turns
+    position_tolerance: Positive = 0.02  # [m] at the goal
+    yaw_tolerance: Positive = 0.0174  # [rad] at the goal
+    off_path: Positive = 0.15  # [m] from the path at which it is given up
+    look_ahead: NotNegative = 0.06  # [m, rad] past the stopping distance that has to be free
+    patience: Positive = 5.0  # [s] of waiting for a lost pose or an obstacle to go away
+    stall: Positive = 3.0  # [s] without motion though motion is commanded
+    creeping: Positive = 0.005  # [m/s, rad/s] below which no motion is expected
+    budge: Positive = 0.003  # [m, rad] that counts as motion
+
+
+class LocalizerSettings(Section):
+    """How odometry and gripper tags become a pose."""
+
+    smoothing: Positive = 0.8  # [s] over which one gripper's tags correct odometry; with both, half of it
+    odometry_age: Positive = 0.3  # [s] without odometry at which the pose is lost
+    tag_age: Positive = 1.0  # [s] without a tag of either gripper at which it is lost
+    jump: Positive = 0.3  # [m] off what is known at which a tag is not believed
+    jump_yaw: Positive = 0.5  # [rad]
