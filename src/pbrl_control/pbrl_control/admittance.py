@@ -104,18 +104,22 @@ class Admittance:
     def __init__(self, settings: ComplianceSettings, home: Array, height: float) -> None:
         self.home = home
         self.height = height
-        axes = (settings.longitudinal, settings.lateral, settings.yaw, settings.vertical)
         most = (settings.speed, settings.speed, settings.yaw_rate, settings.speed)
-        self._axes = tuple(AxisCompliance(axis, top) for axis, top in zip(axes, most, strict=True))
+        soft = (settings.longitudinal, settings.lateral, settings.yaw, settings.vertical)
+        firm = (settings.longitudinal, settings.firm_lateral, settings.firm_yaw, settings.vertical)
+        self._soft = tuple(AxisCompliance(axis, top) for axis, top in zip(soft, most, strict=True))
+        self._firm = tuple(AxisCompliance(axis, top) for axis, top in zip(firm, most, strict=True))
 
-    def step(self, wrench: Array, dt: float) -> tuple[Array, float]:
+    def step(self, wrench: Array, dt: float, *, firm: bool = False) -> tuple[Array, float]:
         """Return the planar twist (3,) in gripper axes and the vertical velocity that compliance adds.
 
         Args:
-            wrench: (4,) as of `grip_wrench`.
+            wrench: (4,) as of `grip_wrench`; where it is known what to expect, less that.
             dt: time since the last step [s].
+            firm: whether the wrench is what was not expected: then no axis is nearly free.
         """
-        vx, vy, omega, lift = (axis.step(force, dt) for axis, force in zip(self._axes, wrench.tolist(), strict=True))
+        axes = self._firm if firm else self._soft
+        vx, vy, omega, lift = (axis.step(force, dt) for axis, force in zip(axes, wrench.tolist(), strict=True))
         return np.array([vx, vy, omega]), lift
 
 

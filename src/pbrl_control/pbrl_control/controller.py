@@ -101,8 +101,8 @@ class BodyController:
         loose = self._uncommanded(twists, holds)
         if loose and any(twist.moves() for twist in twists.values()):
             return f"twist: expected one for the held {loose[0]!r}, got {', '.join(sorted(twists))}"
-        if any(not np.isfinite([*hold.contact, hold.yaw]).all() for hold in holds.values()):
-            return "grasp: expected finite contact and yaw, got NaN or infinity"
+        if not all(hold.usable() for hold in holds.values()):
+            return "grasp: expected finite contact, yaw and expected wrench, got NaN or infinity"
         return ""
 
     def _uncommanded(self, twists: Twists, holds: Holds) -> list[str]:
@@ -157,7 +157,11 @@ class BodyController:
         grip = self._grips[side][1]
         raw = wrenches.get(side, np.full(6, np.nan))
         wrench = grip_wrench(side, gripper, self._bias[side].remove(raw))
-        yielded, lift = grip.step(wrench, dt)
+        unexpected = wrench
+        if hold.expected is not None:
+            # The object pushes back with what moving it takes; only to the rest is yielded, and that firmly.
+            unexpected = wrench + np.array([*turn(hold.expected, hold.yaw), 0.0])
+        yielded, lift = grip.step(unexpected, dt, firm=hold.expected is not None)
         lift += self.settings.arm.height_gain * (grip.height - gripper.height)
         vx, vy, omega = turn(yielded, yaw)
         roll, pitch = levelling(gripper, self.settings.arm.level_gain)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from pbrl_control.percept import Percept
+from pbrl_control.planar import Array
 from pbrl_control.profile import TwistProfile
 from pbrl_control.push_plan import PushPlan
 from pbrl_control.types import Hold, PlanarTwist
@@ -20,11 +21,14 @@ class CourseStep:
         twist: of the object's origin in its axes.
         status: a sentence.
         finished: whether the course is over.
+        expected: wrench (3,) that each grip is expected to apply to the object, by gripper: fx, fy [N], tau [N m] at
+            its contact, object axes; empty where nobody knows.
     """
 
     twist: PlanarTwist
     status: str
     finished: bool = False
+    expected: Mapping[str, Array] = field(default_factory=dict)
 
 
 class Course(Protocol):

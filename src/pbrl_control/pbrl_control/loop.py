@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pbrl_control.controller import BodyController
 from pbrl_control.course import Course
@@ -61,6 +61,7 @@ class ControlLoop:
             holds = holds_of(percept)
         except ControlError as error:
             return LoopCommand(BodyCommand(report=str(error)), push)
+        holds = {side: replace(hold, expected=push.expected.get(side)) for side, hold in holds.items()}
         body = self.controller.tick(BodyState(percept.posture), push.twists, holds, percept.wrenches, dt)
         return LoopCommand(body, push)
 

@@ -14,6 +14,7 @@ from pbrl_control.course import Course, SegmentCourse
 from pbrl_control.errors import ControlError
 from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.percept import Percept, gripper_tag, holds_of
+from pbrl_control.planar import Array
 from pbrl_control.push_plan import PushPlan
 from pbrl_control.types import Hold, PlanarTwist, gripper_frame
 
@@ -64,12 +65,14 @@ class PushCommand:
         status: a sentence; of a failed push, why.
         twists: commands by what they move (see `PlanarTwist`).
         requests: to be asked once, now; answers go to `PushExecutive.answer`.
+        expected: see `CourseStep.expected`.
     """
 
     phase: Phase
     status: str
     twists: Mapping[str, PlanarTwist] = field(default_factory=dict)
     requests: tuple[GripperRequest, ...] = ()
+    expected: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def finished(self) -> bool:
@@ -195,7 +198,7 @@ class PushExecutive:
         if step.finished:
             self._enter(Phase.RELEASE, now)
             return self._rest(step.status, percept)
-        return PushCommand(self.phase, step.status, {self.plan.object: step.twist})
+        return PushCommand(self.phase, step.status, {self.plan.object: step.twist}, expected=step.expected)
 
     def _release(self, now: float, dt: float, percept: Percept) -> PushCommand:
         if now - self._since < self.plan.settle and not self._failure:

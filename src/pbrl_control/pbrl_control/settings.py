@@ -112,13 +112,19 @@ class ComplianceAxis(Section):
 
 
 class ComplianceSettings(Section):
-    """Force compliance of a grip, in the gripper's planar axes: stiff along, nearly free across and about."""
+    """Force compliance of a grip, in the gripper's planar axes: stiff along, nearly free across and about.
+
+    Where it is known what moving the object takes, it is yielded to what was not expected, and firmly in each axis:
+    else furniture that resists would not move across the grip at all.
+    """
 
     longitudinal: ComplianceAxis = ComplianceAxis(damping=2500.0, centring=0.3, forget=2.0, dead_band=2.0)
     lateral: ComplianceAxis = ComplianceAxis(
         damping=2500.0, centring=0.05, forget=2.0, yielding=0.3, leak=3.0, dead_band=2.0
     )
     yaw: ComplianceAxis = ComplianceAxis(damping=6.0, centring=0.05, forget=2.0, yielding=0.5, leak=2.0, dead_band=0.3)
+    firm_lateral: ComplianceAxis = ComplianceAxis(damping=2500.0, centring=0.3, forget=2.0, dead_band=2.0)
+    firm_yaw: ComplianceAxis = ComplianceAxis(damping=30.0, centring=0.3, forget=2.0, dead_band=0.3)
     vertical: ComplianceAxis = ComplianceAxis(damping=4000.0, dead_band=4.0)
     bias_time: Positive = 0.3  # [s] over which a sensor's bias is averaged before a grip closes
     speed: Positive = 0.2  # [m/s] most that compliance adds

@@ -46,11 +46,19 @@ class Hold:
         object: its name.
         contact: (2,) middle of the clamped patch, in the object's frame [m].
         yaw: of the object in the gripper's planar axes, as last seen [rad].
+        expected: (3,) wrench that moving the object takes of this grip: fx, fy [N], tau [N m] on the object at the
+            contact, object axes; None where nobody knows.
     """
 
     object: str
     contact: Array
     yaw: float = 0.0
+    expected: Array | None = None
+
+    def usable(self) -> bool:
+        """Say whether no number of it is NaN or infinite."""
+        parts = [*self.contact, self.yaw, *(() if self.expected is None else self.expected)]
+        return bool(np.isfinite(parts).all())
 
 
 @dataclass(frozen=True)

@@ -157,7 +157,8 @@ def evenly(trials: Sequence[Trial]) -> list[Trial]:
         turn[trial] = counts[key]
         counts[key] += 1
     by_set: dict[str, list[Trial]] = {}
-    for trial in sorted(trials, key=turn.__getitem__):
+    # Of a turn in an order of the folders' names, which say nothing: pairs come in the order of their first effects.
+    for trial in sorted(trials, key=lambda each: (turn[each], each.folder)):
         by_set.setdefault(trial.set, []).append(trial)
     places = {trial: (k + 0.5) / len(each) for each in by_set.values() for k, trial in enumerate(each)}
     return sorted(trials, key=places.__getitem__)

@@ -40,7 +40,7 @@ class TrajectoryCourse:
         command = self.follower.tick(now, tag, forces)
         if command.state == FollowState.ABORTED:
             raise ControlError(command.status)
-        return CourseStep(command.twist, command.status, command.finished)
+        return CourseStep(command.twist, command.status, command.finished, self.follower.expected_wrenches())
 
     def _set_out(self, percept: Percept) -> TrajectoryFollower:
         plan = self._plan

@@ -18,6 +18,7 @@ import numpy as np
 from pbrl_control.constraints.classes import DEFAULTS, ConstraintSettings, Freedom, ModelClass
 from pbrl_control.constraints.object_model import ObjectModel
 from pbrl_control.constraints.twist import achievable_twist
+from pbrl_control.constraints.wrench import expected_grip_wrench
 from pbrl_control.errors import ControlError
 from pbrl_control.percept import Tag, object_planar
 from pbrl_control.planar import Array, compose, inverse, turn
@@ -108,6 +109,7 @@ class TrajectoryFollower:
     ) -> None:
         self.settings, limits = settings or FollowSettings(), limits or AbortLimits()
         self._model, self._constraint = model, constraint
+        self._contacts = dict(contacts or {})
         self.trajectory: Trajectory = trajectory
         self.expected_force: float | None = None
         self.detour = np.zeros(3)
@@ -128,6 +130,7 @@ class TrajectoryFollower:
         self._seen: tuple[float, Array] | None = None  # time and pose of the last tag
         self._error = np.zeros(3)
         self._twist = np.zeros(3)
+        self._summed = np.zeros(3)  # what feedback has added up
         self._refusal = ""
 
     @property
@@ -139,6 +142,22 @@ class TrajectoryFollower:
     def progress(self) -> float:
         """Share of the trajectory's time that is done, 0..1."""
         return min(self._done / self.trajectory.duration, 1.0) if self.trajectory.duration > 0.0 else 1.0
+
+    def expected_wrenches(self) -> dict[str, Array]:
+        """Return the wrench (3,) that each grip is expected to apply now: fx, fy [N], tau [N m] at its contact.
+
+        Object axes. Empty without a model or grips.
+        """
+        if self._model is None or not self._contacts or self._seen is None:
+            return {}
+        sides = sorted(self._contacts)
+        points = np.array([self._contacts[side] for side in sides])
+        point = self.trajectory.at(self._done)
+        moving = self._pace if self.state == FollowState.FOLLOWING else 0.0
+        wrenches = expected_grip_wrench(
+            self._model, self._seen[1], moving * point.twist, moving * point.rate, points, self._constraint
+        )
+        return dict(zip(sides, wrenches, strict=True))
 
     def tick(self, now: float, tag: Tag | None, forces: Forces | None = None) -> FollowCommand:
         """Return what to do at `now` [s]; never raises for what it is told.
@@ -230,6 +249,7 @@ class TrajectoryFollower:
         return self._rest(self._reason)
 
     def _command(self, dt: float) -> FollowCommand:
+        self._summed = self._bounded(self._summed + self.settings.integral * dt * self._error)
         wanted = self._wanted()
         refused = PlanarTwist()
         self._refusal = ""
@@ -248,11 +268,14 @@ class TrajectoryFollower:
         """Return the setpoint's twist seen from the object, and feedback, each part of that within its own bound."""
         point, settings = self.trajectory.at(self._done), self.settings
         ahead = self._pace * turn(point.twist, self._error[2]) if self.state == FollowState.FOLLOWING else np.zeros(3)
-        feedback = settings.gain * self._error
-        speed = float(np.hypot(feedback[0], feedback[1]))
-        feedback[:2] *= min(settings.feedback_speed / speed, 1.0) if speed > 0.0 else 1.0
-        feedback[2] = np.clip(feedback[2], -settings.feedback_yaw_rate, settings.feedback_yaw_rate)
-        return ahead + feedback
+        return ahead + self._bounded(settings.gain * self._error) + self._summed
+
+    def _bounded(self, feedback: Array) -> Array:
+        """Return a feedback (3,) of the same direction, no faster than feedback may be."""
+        settings, speed = self.settings, float(np.hypot(feedback[0], feedback[1]))
+        line = min(settings.feedback_speed / speed, 1.0) if speed > 0.0 else 1.0
+        yaw_rate = min(max(float(feedback[2]), -settings.feedback_yaw_rate), settings.feedback_yaw_rate)
+        return np.array([line * feedback[0], line * feedback[1], yaw_rate])
 
     def _slew(self, wanted: Array, dt: float) -> None:
         """Change the command as fast as allowed, straight towards the wanted one: between two allowed twists."""

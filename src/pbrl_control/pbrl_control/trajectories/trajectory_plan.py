@@ -33,8 +33,9 @@ class FollowSettings(Section):
 
     Attributes:
         gain: [1/s] error of the seen pose to velocity.
-        feedback_speed: [m/s] most that feedback adds.
-        feedback_yaw_rate: [rad/s] most that feedback adds.
+        integral: [1/s^2] summed error to velocity: what the grips give way to a steady resistance is made up for.
+        feedback_speed: [m/s] most that either adds.
+        feedback_yaw_rate: [rad/s] most that either adds.
         smoothing: [s] time constant over which seen errors are averaged.
         slack: [m] behind the setpoint at which the setpoint waits; from half of it on it goes slower.
         yaw_slack: [rad] likewise.
@@ -47,6 +48,7 @@ class FollowSettings(Section):
     """
 
     gain: NotNegative = 1.0
+    integral: NotNegative = 0.2
     feedback_speed: Positive = 0.06
     feedback_yaw_rate: Positive = 0.12
     smoothing: Positive = 0.15
