@@ -36,6 +36,8 @@ REACHED = 1.12
 """A hypothesis that needs less than this scale of the noise predicts windows of its length."""
 POLISHED, POLISHED_OF_SETS, LONGER = 5, 3, 2
 """So many of the likeliest effects, and of the likeliest sets, are climbed on, for so many times the usual steps."""
+EXPLAINS = 10.0
+"""What is likelier than the baseline by more explains something [nat]."""
 LEADS = 3
 """So many of the likeliest effects lead a baseline to where they have the body's own parameters."""
 LED = 100.0
@@ -160,10 +162,11 @@ def _polished(
     explains much too, has found them.
     """
     best = next((each.fitted for each in weighed if each.effects and GRASP_COMPLIANCE not in each.effects), None)
-    none = max((each.fitted.evidence for each in weighed if not each.effects), default=-math.inf)
-    if best is None or best.evidence < none - FREEDOM:
+    if best is None:
         return tried
-    names = [each.effects for each in weighed if each.effects][:most]
+    none = max((each.fitted.evidence for each in weighed if not each.effects), default=-math.inf)
+    # Where nothing explains anything yet, a law that is right may still be on its way: all go on.
+    names = [each.effects for each in weighed if each.effects][: most if best.evidence > none + EXPLAINS else None]
     chosen = {id(each.fitted) for each in weighed if each.effects in names}
     jobs = [each for each in tried if id(each) in chosen and GRASP_COMPLIANCE not in each.hypothesis.effects]
     with ThreadPoolExecutor(options.workers) as pool:
