@@ -81,6 +81,24 @@ def test_force_from_the_object_is_yielded_to(
     assert moved[1] > 0.02
 
 
+def test_what_was_expected_is_not_yielded_to(kinematics: RobotKinematics, push_posture: Posture) -> None:
+    gripper = kinematics.grippers(push_posture)["left"]
+    on_object = np.array([12.0, -20.0, 0.0])  # what the grip has to apply, object axes
+    yaw = gripper.planar[2] + HELD["left"].yaw
+    felt = -np.array([*(rotation(yaw) @ on_object[:2]), 0.0])
+    lever = gripper.pose.rotation @ APPROACH["left"] * GRIP
+    raw = np.concatenate([gripper.pose.rotation.T @ felt, gripper.pose.rotation.T @ np.cross(lever, felt)])
+    rest = {}
+    for name, expected in (("known", on_object), ("unknown", None)):
+        fresh = BodyController(kinematics, SETTINGS)
+        holds = {"left": replace(HELD["left"], expected=expected)}
+        for _ in range(40):
+            rest[name] = fresh.tick(BodyState(push_posture), {"table": PlanarTwist()}, holds, {"left": raw}, DT)
+    moved = {name: world_twist(kinematics, push_posture, rest[name], "left") for name in rest}
+    assert np.abs(moved["known"]).max() < 2e-3
+    assert np.abs(moved["unknown"][:2]).max() > 0.01
+
+
 def test_nothing_asked_is_rest(controller: BodyController, push_posture: Posture) -> None:
     settle(controller, push_posture, {"table": PlanarTwist(0.2)}, HELD, 50)
     command = controller.tick(BodyState(push_posture), {}, HELD, QUIET, DT)
@@ -99,6 +117,7 @@ ODD = {
     "not held": ({"chair": PlanarTwist(0.1)}, HELD, DT, "'chair': expected something held"),
     "other than held": ({"right_ft": PlanarTwist(0.1)}, HELD, DT, "expected one for the held 'table'"),
     "NaN contact": (GO, {"left": Hold("table", np.array([np.nan, 0.0]))}, DT, "grasp: expected finite"),
+    "NaN expected": (GO, {"left": replace(HELD["left"], expected=np.full(3, np.nan))}, DT, "grasp: expected finite"),
     "no period": (GO, HELD, 0.0, "control period"),
     "back in time": (GO, HELD, -0.01, "control period"),
     "late tick": (GO, HELD, 3.0, "control period"),

@@ -27,6 +27,12 @@ def test_twist_there_and_back() -> None:
     assert conversions.seconds(message.header.stamp) == 3.5
 
 
+def test_an_expected_wrench_there_and_back() -> None:
+    message = wired(conversions.expected_to_msg("table_a", np.array([3.0, -1.5, 0.25]), Time(sec=2)))
+    np.testing.assert_array_equal(conversions.expected_from_msg(message), [3.0, -1.5, 0.25])
+    assert message.header.frame_id == "table_a"
+
+
 def test_commands_reach_the_wire() -> None:
     base = wired(conversions.base_to_msg(np.float64(0.2), np.float64(-0.1)))
     assert (base.linear.x, base.angular.z) == (0.2, -0.1)

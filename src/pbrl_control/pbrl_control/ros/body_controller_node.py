@@ -8,6 +8,7 @@ joint states cease nothing is sent any more, and base and arms stop by their own
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -32,6 +33,7 @@ from pbrl_control.planar import Array
 from pbrl_control.ros.conversions import (
     arm_to_msg,
     base_to_msg,
+    expected_from_msg,
     grips_from_msg,
     posture_from_msg,
     seconds,
@@ -42,7 +44,7 @@ from pbrl_control.ros.conversions import (
 from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
 from pbrl_control.sensor_watch import SensorWatch
 from pbrl_control.settings import ControllerSettings, load_section
-from pbrl_control.types import BodyCommand, BodyState
+from pbrl_control.types import BodyCommand, BodyState, Hold
 from pbrl_control.watchdog import Watchdog
 
 JOINTS = "joint positions"
@@ -63,6 +65,7 @@ class BodyControllerNode(Node):
         self._emergency = False
         self._wrenches: dict[str, Array] = {}
         self._grips: dict[str, Grip] = {}
+        self._expected: dict[str, tuple[float, str, Array]] = {}
         self._tags: dict[str, Tag] = {}
         self._tag_topics: set[str] = set()
         self._last: float | None = None
@@ -89,6 +92,8 @@ class BodyControllerNode(Node):
         self.create_subscription(Bool, "/emergency_stop", self._on_emergency, LATCHED)
         for side in SIDES:
             self.create_subscription(WrenchStamped, f"/wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
+            expected = f"/expected_grip_wrench/{side}"
+            self.create_subscription(WrenchStamped, expected, partial(self._on_expected, side), COMMANDS)
             self._listen_to_tag(gripper_tag(side))
 
     def _listen_to_tag(self, name: str) -> None:
@@ -122,6 +127,9 @@ class BodyControllerNode(Node):
         wrench = self._wrenches[side] = wrench_from_msg(message)
         self._watch.feed(_wrench_stream(side), self._now(), wrench, moving=self._in_motion)
 
+    def _on_expected(self, side: str, message: WrenchStamped) -> None:
+        self._expected[side] = (self._now(), message.header.frame_id, expected_from_msg(message))
+
     def _on_tag(self, name: str, message: PoseStamped) -> None:
         tag = self._tags[name] = tag_from_msg(message)
         self._watch.feed(_tag_stream(name), self._now(), np.array([tag.time]), moving=self._in_motion)
@@ -142,11 +150,19 @@ class BodyControllerNode(Node):
             lost = self._lost_stream(posture) if twists else ""
             if lost:
                 return controller.stand(lost)
-            holds = holds_of(Percept(posture, self._tags, self._wrenches, self._grips))
+            holds = self._with_expected(holds_of(Percept(posture, self._tags, self._wrenches, self._grips)))
             command = controller.tick(BodyState(posture), twists, holds, self._wrenches, dt)
         except ControlError as error:
             return BodyCommand(report=str(error))
         return command if twists or command.report else None
+
+    def _with_expected(self, holds: dict[str, Hold]) -> dict[str, Hold]:
+        """Return the holds with what their grips are expected to apply, where that was said of late."""
+        now, told = self._now(), dict(holds)
+        for side, (when, target, wrench) in self._expected.items():
+            if side in holds and target == holds[side].object and 0.0 <= now - when <= self._settings.timeout:
+                told[side] = replace(holds[side], expected=wrench)
+        return told
 
     def _lost_stream(self, posture: Posture) -> str:
         """Return which stream that is needed cannot be trusted, and why; empty where all can."""

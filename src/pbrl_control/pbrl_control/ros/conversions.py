@@ -45,6 +45,21 @@ def grips_from_msg(message: Grasps) -> dict[str, Grip]:
     }
 
 
+def expected_to_msg(target: str, wrench: Array, stamp: Time) -> WrenchStamped:
+    """Return the wrench (3,) that a grip is expected to apply to an object, fx, fy [N], tau [N m], object axes."""
+    message = WrenchStamped()
+    message.header.stamp, message.header.frame_id = stamp, target
+    message.wrench.force.x, message.wrench.force.y = float(wrench[0]), float(wrench[1])
+    message.wrench.torque.z = float(wrench[2])
+    return message
+
+
+def expected_from_msg(message: WrenchStamped) -> Array:
+    """Return the wrench (3,) that a grip is expected to apply, see `expected_to_msg`."""
+    force = message.wrench.force
+    return np.array([force.x, force.y, message.wrench.torque.z])
+
+
 def bodies_from_msg(message: Scene) -> dict[str, BodyShape]:
     """Return the known geometry by name."""
     return {

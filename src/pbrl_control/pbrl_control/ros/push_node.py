@@ -28,7 +28,14 @@ from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag
 from pbrl_control.planar import Array
 from pbrl_control.push import GripperAnswer, GripperRequest, Phase, PushCommand, PushExecutive
 from pbrl_control.push_plan import load_plan
-from pbrl_control.ros.conversions import bodies_from_msg, grips_from_msg, tag_from_msg, twist_to_msg, wrench_from_msg
+from pbrl_control.ros.conversions import (
+    bodies_from_msg,
+    expected_to_msg,
+    grips_from_msg,
+    tag_from_msg,
+    twist_to_msg,
+    wrench_from_msg,
+)
 from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
 from pbrl_control.trajectories.course import TrajectoryCourse
 from pbrl_control.trajectories.trajectory_plan import load_trajectory
@@ -69,6 +76,10 @@ class PushNode(Node):
         self._subscribe()
         self._status = self.create_publisher(String, "/push/status", LATCHED)
         self._twist = self.create_publisher(TwistStamped, "/object_twist_command", COMMANDS)
+        self._expected = {
+            side: self.create_publisher(WrenchStamped, f"/expected_grip_wrench/{side}", COMMANDS)
+            for side in (grip.gripper for grip in self._executive.plan.grips)
+        }
         self._callers: dict[str, Client] = {
             "grasp": self.create_client(GraspObject, "/grasp"),
             "release": self.create_client(ReleaseObject, "/release"),
@@ -125,6 +136,9 @@ class PushNode(Node):
         command = self._executive.tick(now.nanoseconds * 1e-9, percept)
         for target, twist in command.twists.items():
             self._twist.publish(twist_to_msg(target, twist, now.to_msg()))
+        for side, wrench in command.expected.items():
+            message = expected_to_msg(self._executive.plan.object, wrench, now.to_msg())
+            self._expected[side].publish(message)
         for request in command.requests:
             self._ask(request)
         self._tell(command)
