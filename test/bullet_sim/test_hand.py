@@ -139,6 +139,17 @@ def test_two_grasps_are_told_as_two(lab: Any) -> None:
     assert np.hypot(*way.T).max() < 0.25, "the hand is carried, it does not jump"
 
 
+def test_carried_half_a_turn_the_hand_turns_one_way(lab: Any) -> None:
+    scene = lab.scene({"table_a": PLAIN}, sensors=QUIET)
+    short = HandPath(np.array([0.0, 0.5, 1.0]), np.array([[0, 0, 0], [0.1, 0, 0.05], [0, 0, 0]]), "hand")
+    edges = [(-0.4, 0.0), (0.4, 0.0), (-0.4, 0.0), (0.4, 0.0)]
+    recording = push_by_hand(scene, [HandPush("table_a", edge, short) for edge in edges], seed=1)
+    quaternion = recording.tags["left_gripper"].quaternion
+    turned = np.abs((quaternion[1:] * quaternion[:-1]).sum(axis=1))
+    assert recording.status == "done"
+    assert 2.0 * np.arccos(np.minimum(turned, 1.0)).max() < 0.5, "from one picture to the next"
+
+
 def test_a_table_on_a_slope_waits_for_the_hand_and_a_lower_one_is_taken_lower(lab: Any) -> None:
     low = PLAIN | {"pose": [2.5, 0, 0], "height": 0.5}
     scene = lab.scene({"table_a": PLAIN, "table_b": low}, concealed={"floor_slope": {"angle": 0.02}}, sensors=QUIET)

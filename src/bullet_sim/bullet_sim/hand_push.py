@@ -228,11 +228,14 @@ class HandRun:
         """Bring the open hand to the next grasp, along a straight line and softly."""
         start = np.array([self._hand.x, self._hand.y, self._hand.yaw, self._hand.height])
         steps = round(CARRYING / self._world.client.step_time)
+        turned = 0.0
         for number in range(1, steps + 1):
             share = number / steps
             share = share * share * (3 - 2 * share)
             way = np.array(self._grasp_place(push)) - start
-            way[2] = (way[2] + math.pi) % (2 * math.pi) - math.pi
+            # As before, not the shorter way each time: half a turn would be one way now and the other a moment later.
+            turned += (way[2] - turned + math.pi) % (2 * math.pi) - math.pi
+            way[2] = turned
             self._hand.put(*(start + share * way).tolist())
             self._step(0.0, 0.0, 0.0)
 
