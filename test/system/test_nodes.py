@@ -20,6 +20,7 @@ NODES = [
     ("pbrl_control", "body_controller_node"),
     ("pbrl_control", "push_node"),
     ("pbrl_model", "model_node"),
+    ("pbrl_model", "tag_detector_node"),
     ("pbrl_mismatch", "mismatch_node"),
 ]
 
