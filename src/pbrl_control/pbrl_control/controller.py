@@ -189,14 +189,18 @@ class BodyController:
         if not any(task.wanted.any() for task in tasks.values()):
             return np.zeros(2)
         count = len(tasks)
-        places = [grippers[side].planar for side in tasks]
-        homes = [self._home_of(side) for side in tasks]
-        home = sum(homes, np.zeros(3)) / count
-        yaw = home[2] + sum(wrap(place[2] - at[2]) for place, at in zip(places, homes, strict=True)) / count
-        middle = sum((place[:2] for place in places), np.zeros(2)) / count
-        carried = np.array([middle[0], middle[1], yaw])
-        parts = (shift(task.wanted, middle - place[:2]) for task, place in zip(tasks.values(), places, strict=True))
-        return self._steering.wish(carried, sum(parts, np.zeros(3)) / count, home)
+        home, away = np.zeros(3), np.zeros(3)
+        for side in tasks:
+            own = self._home_of(side)
+            off = grippers[side].planar - own
+            off[2] = wrap(float(off[2]))
+            home += own / count
+            away += off / count
+        carried = home + away
+        twist = np.zeros(3)
+        for side, task in tasks.items():
+            twist += shift(task.wanted, carried[:2] - grippers[side].planar[:2]) / count
+        return self._steering.wish(carried, twist, home)
 
     def _home_of(self, side: str) -> Array:
         """Return the (3,) place of a gripper in `base` that the base keeps it at: of a grip, where it closed."""
