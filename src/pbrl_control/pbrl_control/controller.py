@@ -13,7 +13,7 @@ import numpy as np
 
 from pbrl_control.admittance import Admittance, ForceGovernor, WrenchBias, grip_wrench
 from pbrl_control.kinematics import SIDES, GripperState, RobotKinematics
-from pbrl_control.limits import ARMS, BodyGate, usable_period
+from pbrl_control.limits import WIDTH, BodyGate, usable_period
 from pbrl_control.planar import Array, shift, turn, wrap
 from pbrl_control.settings import ControllerSettings
 from pbrl_control.types import (
@@ -221,7 +221,7 @@ class BodyController:
     def _drive(self, state: BodyState, twist: PlanarTwist, dt: float) -> BodyCommand:
         """Drive the base alone, arms at rest."""
         low, high = self._gate.range(np.concatenate((state.posture.left, state.posture.right)), dt)
-        velocity = np.zeros(ARMS.stop)
+        velocity = np.zeros(WIDTH)
         velocity[:2] = twist.vx, twist.omega
         return self._command(Solution(velocity, 1.0), low, high)
 

@@ -16,7 +16,6 @@ from pbrl_control.planar import Array
 from pbrl_control.settings import ArmSettings, BaseSettings
 
 WIDTH = 16  # numbers in a body velocity
-ARMS = slice(2, WIDTH)
 LONGEST = 0.1  # [s] period that a command may have to last
 
 

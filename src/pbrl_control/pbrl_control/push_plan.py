@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from pydantic import Field, model_validator
 
-from pbrl_control.errors import ControlError
 from pbrl_control.grasp_plan import GraspPlan
-from pbrl_control.settings import Planar, Positive, Section, load_section
+from pbrl_control.installed import load_named
+from pbrl_control.settings import Planar, Positive, Section
 
 
 class Segment(Section):
@@ -59,17 +58,4 @@ def load_plan(name_or_path: str | Path) -> PushPlan:
     Raises:
         ControlError: there is no such plan, or it is not as it should be.
     """
-    path = Path(name_or_path)
-    if path.suffix not in (".yaml", ".yml"):
-        path = _installed_pushes() / f"{name_or_path}.yaml"
-        if not path.exists():
-            known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml"))) or "none"
-            raise ControlError(f"push plan: expected a path or one of {known}, got {str(name_or_path)!r}")
-    return load_section(path, PushPlan, "push plan")
-
-
-def _installed_pushes() -> Path:
-    try:
-        return Path(get_package_share_directory("pbrl_config")) / "params" / "pushes"
-    except PackageNotFoundError as error:
-        raise ControlError("push plan: expected package pbrl_config to be installed; run ./pbrl once") from error
+    return load_named(name_or_path, "pushes", PushPlan, "push plan")

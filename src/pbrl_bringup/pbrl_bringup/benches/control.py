@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,7 +13,6 @@ from pbrl_bringup.benches.control_laws import (
     heading,
     jacobian_error,
     limit_excess,
-    median,
     tick_times,
     workspace_margin,
 )
@@ -55,7 +55,7 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
 
 def _tick_row(count: int) -> Row:
     """Return the median tick, beside that of the thesis's way."""
-    ours, thesis = (1e3 * median(tick_times(count, method)) for method in ("program", "pseudo-inverse"))
+    ours, thesis = (1e3 * statistics.median(tick_times(count, method)) for method in ("program", "pseudo-inverse"))
     return at_most("one controller tick, median", ours, "ms", 0.2, pseudo_inverse=thesis)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -223,11 +222,6 @@ def _margin(settings: ControllerSettings, side: str, planar: Array) -> float:
     program = settings.program
     x, y = planar[0], planar[1] if side == "left" else -planar[1]
     return float(min(x - program.reach_x[0], program.reach_x[1] - x, y - program.reach_y[0], program.reach_y[1] - y))
-
-
-def median(values: list[float]) -> float:
-    """Return the median."""
-    return statistics.median(values)
 
 
 def heading(angle: float, speed: float) -> tuple[float, float, float]:

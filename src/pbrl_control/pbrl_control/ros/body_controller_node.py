@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, WrenchStamped
 from pbrl_msgs.msg import Grasps, Scene
 from rclpy.executors import ExternalShutdownException
@@ -27,6 +26,7 @@ from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.stopping import init_until_signal, spin_until
 from pbrl_control.controller import BodyController
 from pbrl_control.errors import ControlError
+from pbrl_control.installed import params_folder
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
 from pbrl_control.percept import Grip, Percept, Tag, gripper_tag, holds_of
 from pbrl_control.planar import Array
@@ -58,7 +58,8 @@ class BodyControllerNode(Node):
         super().__init__("body_controller_node")
         path = declare(self, "settings", "", "YAML of gains and limits; empty: body_controller.yaml as installed")
         refuse_unknown(self)
-        self._settings = load_section(Path(path) if path else _installed_settings(), ControllerSettings, "settings")
+        file = Path(path) if path else params_folder("settings") / "body_controller.yaml"
+        self._settings = load_section(file, ControllerSettings, "settings")
         self._controller: BodyController | None = None
         self._watchdog = Watchdog(self._settings.timeout)
         self._watch = SensorWatch(self._settings.watch)
@@ -200,13 +201,6 @@ def _wrench_stream(side: str) -> str:
 
 def _tag_stream(name: str) -> str:
     return f"tag {name!r}"
-
-
-def _installed_settings() -> Path:
-    try:
-        return Path(get_package_share_directory("pbrl_config")) / "params" / "body_controller.yaml"
-    except PackageNotFoundError as error:
-        raise ControlError("settings: expected package pbrl_config to be installed; run ./pbrl once") from error
 
 
 def main() -> None:

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from pydantic import Field, model_validator
 
 from pbrl_control.errors import ControlError
 from pbrl_control.grasp_plan import GraspPlan
+from pbrl_control.installed import load_named
 from pbrl_control.planar import Array, compose
-from pbrl_control.settings import NotNegative, Planar, Positive, Section, load_section
+from pbrl_control.settings import NotNegative, Planar, Positive, Section
 from pbrl_control.trajectories.trajectory import MotionLimits, ObjectTrajectory
 
 
@@ -140,17 +140,4 @@ def load_trajectory(name_or_path: str | Path) -> TrajectoryPlan:
     Raises:
         ControlError: there is no such plan, or it is not as it should be.
     """
-    path = Path(name_or_path)
-    if path.suffix not in (".yaml", ".yml"):
-        path = _installed() / f"{name_or_path}.yaml"
-        if not path.exists():
-            known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml"))) or "none"
-            raise ControlError(f"trajectory: expected a path or one of {known}, got {str(name_or_path)!r}")
-    return load_section(path, TrajectoryPlan, "trajectory")
-
-
-def _installed() -> Path:
-    try:
-        return Path(get_package_share_directory("pbrl_config")) / "params" / "trajectories"
-    except PackageNotFoundError as error:
-        raise ControlError("trajectory: expected package pbrl_config to be installed; run ./pbrl once") from error
+    return load_named(name_or_path, "trajectories", TrajectoryPlan, "trajectory")

@@ -70,7 +70,8 @@ class WholeBodyProgram:
         self._asked, self._added = np.zeros((2, 6)), np.zeros((2, 6))
         self._against, self._room = np.zeros((2, 2)), np.zeros(2)
         self._hessian, self._linear = np.zeros((UNKNOWNS, UNKNOWNS)), np.zeros(UNKNOWNS)
-        self._rows, self._least, self._most = np.zeros((ROWS, UNKNOWNS)), np.zeros(23), np.zeros(23)
+        bounds = UNKNOWNS + ROWS
+        self._rows, self._least, self._most = np.zeros((ROWS, UNKNOWNS)), np.zeros(bounds), np.zeros(bounds)
 
     def solve(
         self,
