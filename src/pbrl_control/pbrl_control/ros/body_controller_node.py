@@ -46,6 +46,7 @@ from pbrl_control.sensor_watch import SensorWatch
 from pbrl_control.settings import ControllerSettings, load_section
 from pbrl_control.types import BodyCommand, BodyState, Hold
 from pbrl_control.watchdog import Watchdog
+from pbrl_control.whole_body.prepare import compile_kernels
 
 JOINTS = "joint positions"
 STIRS = 0.02  # [rad/s] of a joint, at which its position has to change
@@ -60,6 +61,7 @@ class BodyControllerNode(Node):
         refuse_unknown(self)
         file = Path(path) if path else params_folder("settings") / "body_controller.yaml"
         self._settings = load_section(file, ControllerSettings, "settings")
+        compile_kernels(self._settings)  # before anybody can see this node: who sees it may count on its ticks
         self._controller: BodyController | None = None
         self._watchdog = Watchdog(self._settings.timeout)
         self._watch = SensorWatch(self._settings.watch)
