@@ -117,6 +117,7 @@ def push_and_learn(settings: DemoSettings, bag: Path, say: Say) -> dict[str, Pos
             status, models = client.listen(String, "/push/status"), client.listen(ObjectModels, "/object_models")
             for service in ("/grasp", "/learn"):
                 client.wait_for_service(service, START_TIME)
+            client.wait_for_topic("/body_controller/status", START_TIME)
             client.wait_until(lambda: any(bag.glob("*.mcap")), START_TIME, "the recorder made no file")
             say("[bold]2[/] the push")
             programs.start("push", commands["push"])
