@@ -36,7 +36,9 @@ def in_parallel(trial: Callable[..., Result], arguments: Sequence[tuple[Any, ...
     results: dict[int, Result] = {}
     with (
         _one_thread_each(),
-        ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn"), initializer=_obey_the_parent) as pool,
+        ProcessPoolExecutor(
+            len(os.sched_getaffinity(0)), mp_context=get_context("spawn"), initializer=_obey_the_parent
+        ) as pool,
         progress(what, len(arguments)) as bar,
     ):
         try:
