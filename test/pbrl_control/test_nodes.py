@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Float64MultiArray, String
+from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
 from pbrl_control.kinematics import ARM_JOINTS, BODY_JOINTS, Posture
 from pbrl_control.ros.body_controller_node import BodyControllerNode
@@ -40,6 +41,10 @@ class World(Node):
         self.base: list[Twist] = []
         self.right: list[Float64MultiArray] = []
         self.status: list[str] = []
+        self.shares: list[float] = []
+        self.create_subscription(
+            Float64, "/body_controller/share", lambda message: self.shares.append(message.data), COMMANDS
+        )
         self.twists: list[TwistStamped] = []
         self.create_subscription(Twist, "/cmd_vel", self.base.append, COMMANDS)
         self.create_subscription(
@@ -157,6 +162,40 @@ def test_joint_positions_that_freeze_stop_the_robot(spin_with, push_posture: Pos
     until(lambda: world.base[-1].linear.x == 0.0 and not any(world.right[-1].data), lambda turn: None)
 
 
+def test_with_every_command_it_says_how_much_of_it_is_done(spin_with, push_posture: Posture, root: Path) -> None:
+    _, world, until = spin_with(BodyControllerNode)
+    world.description.publish(String(data=(root / "urdf/krang/krang.urdf").read_text()))
+    far_too_fast, slow = (("left_ft", PlanarTwist(vy=speed)) for speed in (30.0, 0.01))
+    until(lambda: len(world.shares) > 5, lambda turn: world.tell(0.02 * turn, moved(push_posture, turn), far_too_fast))
+    assert 0.0 <= max(world.shares) < 0.5
+    until(lambda: world.shares[-1] > 0.9, lambda turn: world.tell(10.0 + 0.02 * turn, moved(push_posture, turn), slow))
+    world.emergency.publish(Bool(data=True))
+    until(lambda: world.shares[-1] == 0.0, lambda turn: world.tell(30.0 + 0.02 * turn, moved(push_posture, turn), slow))
+    until(lambda: len(world.shares) == len(world.base), lambda turn: None)
+
+
+@pytest.mark.parametrize("spin_with", [["-p", "body_controller_node:rate:=100"]], indirect=True)
+def test_with_a_rate_it_ticks_between_joint_states_and_not_without_them(
+    spin_with, push_posture: Posture, root: Path
+) -> None:
+    _, world, until = spin_with(BodyControllerNode)
+    world.description.publish(String(data=(root / "urdf/krang/krang.urdf").read_text()))
+    forward = ("left_ft", PlanarTwist(vx=0.3))
+    until(lambda: len(world.base) > 3, lambda turn: world.tell(0.02 * turn, moved(push_posture, turn), forward))
+    said = len(world.base)
+    until(lambda: len(world.base) > said + 5, lambda turn: None)
+    assert world.base[-1].linear.x > 0.0
+    silent = [len(world.base), time.monotonic()]
+
+    def quiet() -> bool:
+        if len(world.base) != silent[0]:
+            silent[:] = len(world.base), time.monotonic()
+        return time.monotonic() - silent[1] > 0.5
+
+    until(quiet, lambda turn: None)
+    until(lambda: len(world.base) > silent[0], lambda turn: world.tell(1.0, moved(push_posture, turn), forward))
+
+
 def test_push_without_a_scene_fails_with_a_sentence(spin_with, push_posture: Posture) -> None:
     node, world, until = spin_with(PushNode)
     until(
@@ -166,6 +205,29 @@ def test_push_without_a_scene_fails_with_a_sentence(spin_with, push_posture: Pos
     assert world.status[-1].startswith("failed: no sight of body 'table_a' in the scene")
     assert node.ended.done()
     assert {message.header.frame_id for message in world.twists} == {"left_ft"}
+
+
+FETCH = ["-p", "push_node:trajectory:=turn_about_caster", "-p", "push_node:fetch:=true"]
+
+
+@pytest.mark.parametrize("spin_with", [FETCH, [*FETCH, "-p", "push_node:grips:=sampled"]], indirect=True)
+def test_a_fetch_looks_around_and_says_what_it_does_not_see(spin_with, push_posture: Posture, root: Path) -> None:
+    node, world, until = spin_with(PushNode)
+    world.tell(1.0, push_posture)
+    assert node._executive is None, "the robot is not known yet"
+    world.description.publish(String(data=(root / "urdf/krang/krang.urdf").read_text()))
+    scene = world.create_publisher(Scene, "/scene", LATCHED)
+    corners = [Point(x=x, y=y) for x, y in ((-0.4, -0.7), (0.4, -0.7), (0.4, 0.7), (-0.4, 0.7))]
+    names = ("table_a", "table_b", "wall")
+    scene.publish(Scene(bodies=[Body(name=n, footprint=corners, height=0.77, movable=n != "wall") for n in names]))
+    until(
+        lambda: bool(world.status) and "failed" in world.status[-1], lambda turn: world.tell(1.0 + turn, push_posture)
+    )
+    assert world.status[0] == "locate"
+    assert "tag 'table_a'; tag 'table_b'; pose of the base (odometry: expected" in world.status[-1]
+    assert {message.header.frame_id for message in world.twists} == {"base"}
+    assert not any(message.twist.linear.x or message.twist.angular.z for message in world.twists)
+    assert node.ended.done()
 
 
 @pytest.mark.parametrize("spin_with", [["-p", "push_node:trajectory:=turn_about_caster"]], indirect=True)
@@ -197,6 +259,8 @@ def test_a_trajectory_is_followed_as_the_learned_model_allows(spin_with, push_po
         ("push_node", ["-p", "trajectory:=nowhere"], "trajectory: expected a path or one of straight_and_turn"),
         ("push_node", ["-p", "rate:=1"], "rate: expected 10 to 200"),
         ("push_node", ["-p", "plam:=turn_table"], "did you mean 'plan'?"),
+        ("push_node", ["-p", "grips:=sampled"], "sampled together with fetch:=true"),
+        ("push_node", ["-p", "grips:=any", "-p", "fetch:=true"], "grips: expected plan"),
         ("body_controller_node", ["-p", "settings:=no_such_file.yaml"], "expected a readable YAML file"),
         ("body_controller_node", ["-p", "settings:=3"], "settings: expected str"),
         ("body_controller_node", ["-p", "setings:=x.yaml"], "did you mean 'settings'?"),

@@ -11,35 +11,40 @@ import math
 
 import numpy as np
 
+from pbrl_control.admittance_kernel import held_task, wrench_at_plates
 from pbrl_control.kinematics import APPROACH, GRIP, GripperState
-from pbrl_control.planar import Array, cross
-from pbrl_control.settings import ComplianceAxis, ComplianceSettings, ProgramSettings
+from pbrl_control.planar import Array
+from pbrl_control.settings import ComplianceAxis, ComplianceSettings, ControllerSettings
+from pbrl_control.types import Hold, PlanarTwist
+from pbrl_control.whole_body.task import Task
+
+FASTEST = 1.0
+"""[m/s] No gripper goes faster than this."""
 
 
 class WrenchBias:
     """The wrench a sensor shows while nothing is held: gripper weight and bias, averaged until a grip closes.
 
     The plates are kept level, so the weight does not change in sensor axes while they turn about the vertical.
+
+    Attributes:
+        mean: (6,) force, torque [N, N m]; zeros before the first sample.
     """
 
     def __init__(self, time: float) -> None:
+        self.mean = np.zeros(6)
         self._time = time
-        self._mean: Array | None = None
+        self._known = False
 
     def update(self, raw: Array, dt: float) -> None:
         """Take in a sample (6,) while nothing is held; samples that are not finite are left out."""
-        if not np.isfinite(raw).all():
-            return
-        if self._mean is None:
-            self._mean = np.array(raw, dtype=float)
-        else:
-            self._mean += (1.0 - math.exp(-dt / self._time)) * (raw - self._mean)
+        if np.isfinite(raw).all():
+            self.mean += (1.0 - math.exp(-dt / self._time) if self._known else 1.0) * (raw - self.mean)
+            self._known = True
 
     def remove(self, raw: Array) -> Array:
         """Return the wrench (6,) that the held object exerts on the gripper; zeros where the sample is not finite."""
-        if not np.isfinite(raw).all():
-            return np.zeros(6)
-        return np.array(raw) if self._mean is None else raw - self._mean
+        return raw - self.mean if np.isfinite(raw).all() else np.zeros(6)
 
 
 def grip_wrench(side: str, gripper: GripperState, wrench: Array) -> Array:
@@ -50,96 +55,89 @@ def grip_wrench(side: str, gripper: GripperState, wrench: Array) -> Array:
         gripper: where it is.
         wrench: (6,) force then torque at `<side>_ft`, in its axes, bias removed.
     """
-    rotation = gripper.pose.rotation
-    lever = rotation @ APPROACH[side] * GRIP
-    force = rotation @ wrench[:3]
-    torque = rotation @ wrench[3:] - cross(lever, force)
-    c, s = math.cos(gripper.planar[2]), math.sin(gripper.planar[2])
-    return np.array([c * force[0] + s * force[1], c * force[1] - s * force[0], torque[2], force[2]])
+    found = np.empty(4)
+    wrench_at_plates(gripper.pose.rotation, float(gripper.planar[2]), APPROACH[side], GRIP, wrench, found)
+    return found
 
 
-class AxisCompliance:
-    """One axis: gives way to a force, and comes back by and by from where it gave way to.
-
-    What is come back from is what this axis gave way itself, not how far the gripper is from some place: base and
-    arms may carry it wherever the task is, and the compliance neither knows nor resists.
+class HeldGrip:
+    """A grip from the moment it closed: moves with what it holds, gives way, and does not go on against too much force.
 
     Args:
-        settings: of the axis.
-        most: speed that it adds [m/s or rad/s].
-    """
-
-    def __init__(self, settings: ComplianceAxis, most: float) -> None:
-        self._settings = settings
-        self._most = most
-        self._slow = 0.0
-        self._given = 0.0
-
-    def step(self, force: float, dt: float) -> float:
-        """Return the velocity [m/s or rad/s] that yields to the force the object exerts on the gripper.
-
-        Args:
-            force: [N or N m].
-            dt: time since the last step [s].
-        """
-        settings = self._settings
-        felt = math.copysign(max(abs(force) - settings.dead_band, 0.0), force)
-        fast = felt / settings.damping
-        if settings.yielding is not None:
-            self._slow += dt * (fast / settings.yielding - self._slow / settings.leak)
-        velocity = fast + self._slow - settings.centring * self._given
-        velocity = min(max(velocity, -self._most), self._most)
-        self._given += dt * (velocity - (self._given / settings.forget if settings.forget is not None else 0.0))
-        return velocity
-
-
-class Admittance:
-    """Compliance of one grip in its planar axes, from the moment it closed.
+        side: "left" or "right".
+        target: name of what is held.
+        settings: of the controller.
+        gripper: where it closed.
 
     Attributes:
+        target: name of what is held.
         home: (3,) where the gripper was in `base` when it closed [m, rad].
-        height: of the plates then [m].
     """
 
-    def __init__(self, settings: ComplianceSettings, home: Array, height: float) -> None:
-        self.home = home
-        self.height = height
-        most = (settings.speed, settings.speed, settings.yaw_rate, settings.speed)
-        soft = (settings.longitudinal, settings.lateral, settings.yaw, settings.vertical)
-        firm = (settings.longitudinal, settings.firm_lateral, settings.firm_yaw, settings.vertical)
-        self._soft = tuple(AxisCompliance(axis, top) for axis, top in zip(soft, most, strict=True))
-        self._firm = tuple(AxisCompliance(axis, top) for axis, top in zip(firm, most, strict=True))
+    def __init__(self, side: str, target: str, settings: ControllerSettings, gripper: GripperState) -> None:
+        self.target = target
+        self.home = gripper.planar
+        self._height = gripper.height
+        self._approach = APPROACH[side]
+        arm, program = settings.arm, settings.program
+        self._gains = np.array(
+            [arm.level_gain, arm.height_gain, program.grip_force, program.grip_slow, program.grip_resume]
+        )
+        self._laws = compliance_laws(settings.compliance)
+        self._memory = np.zeros((2, 4, 2))
+        self._share = 1.0
+        self._raw, self._twist, self._contact, self._expected = (np.zeros(size) for size in (6, 3, 2, 3))
 
-    def step(self, wrench: Array, dt: float, *, firm: bool = False) -> tuple[Array, float]:
-        """Return the planar twist (3,) in gripper axes and the vertical velocity that compliance adds.
+    def task(self, gripper: GripperState, twist: PlanarTwist, hold: Hold, raw: Array, bias: Array, dt: float) -> Task:
+        """Return what the gripper is to do; see `held_task`.
 
         Args:
-            wrench: (4,) as of `grip_wrench`; where it is known what to expect, less that.
-            dt: time since the last step [s].
-            firm: whether the wrench is what was not expected: then no axis is nearly free.
+            gripper: where it is.
+            twist: of the object's origin, in its axes.
+            hold: where the gripper has hold of it, and what wrench that takes.
+            raw: (6,) of the wrist sensor, `<side>_ft`; not finite: nothing is felt.
+            bias: (6,) of it.
+            dt: time since the last tick [s].
         """
-        axes = self._firm if firm else self._soft
-        vx, vy, omega, lift = (axis.step(force, dt) for axis, force in zip(axes, wrench.tolist(), strict=True))
-        return np.array([vx, vy, omega]), lift
+        self._raw[:], self._contact[:] = raw, hold.contact
+        self._twist[:] = twist.vx, twist.vy, twist.omega
+        self._expected[:] = 0.0 if hold.expected is None else hold.expected
+        wanted, added, against = np.empty(3), np.empty(6), np.empty(2)
+        self._share = held_task(
+            gripper.pose.rotation,
+            float(gripper.planar[2]),
+            self._approach,
+            GRIP,
+            self._raw,
+            bias,
+            self._twist,
+            self._contact,
+            float(hold.yaw),
+            self._expected,
+            hold.expected is not None,
+            self._laws,
+            self._memory,
+            self._gains,
+            self._height - gripper.height,
+            self._share,
+            dt,
+            wanted,
+            added,
+            against,
+        )
+        return Task(wanted, 0.0, added, against, FASTEST * self._share)
 
 
-class ForceGovernor:
-    """How fast a gripper may go against the force that it feels: as fast as ever, until the force is past its limit.
+def compliance_laws(settings: ComplianceSettings) -> Array:
+    """Return (2, 4, 7) laws of the soft and the firm axes: along, left, about the vertical, up; see `axis_velocity`."""
+    speed, yaw_rate = settings.speed, settings.yaw_rate
+    along, up = axis_law(settings.longitudinal, speed), axis_law(settings.vertical, speed)
+    soft = [along, axis_law(settings.lateral, speed), axis_law(settings.yaw, yaw_rate), up]
+    firm = [along, axis_law(settings.firm_lateral, speed), axis_law(settings.firm_yaw, yaw_rate), up]
+    return np.array([soft, firm])
 
-    Args:
-        settings: limit and rates.
-        speed: that is as fast as ever [m/s].
-    """
 
-    def __init__(self, settings: ProgramSettings, speed: float) -> None:
-        self._settings = settings
-        self._speed = speed
-        self._share = 1.0
-
-    def step(self, force: Array, dt: float) -> tuple[Array, float]:
-        """Return the unit vector (2,) against a horizontal force (2,) [N], and the speed along it [m/s]."""
-        strong = math.hypot(force[0], force[1])
-        beyond = strong / self._settings.grip_force - 1.0
-        rate = -self._settings.grip_slow * beyond if beyond > 0.0 else self._settings.grip_resume
-        self._share = min(max(self._share + rate * dt, 0.0), 1.0)
-        return (-force / strong if strong > 0.0 else np.zeros(2)), self._speed * self._share
+def axis_law(axis: ComplianceAxis, most: float) -> Array:
+    """Return (7,) numbers of one axis, which adds `most` [m/s or rad/s] at most."""
+    forget, yielding = (math.inf if value is None else value for value in (axis.forget, axis.yielding))
+    return np.array([axis.damping, axis.centring, forget, yielding, axis.leak, axis.dead_band, most])

@@ -7,19 +7,20 @@ range of velocities that limits allow, and the whole body solved for at once (`w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from itertools import product
 
 import numpy as np
 
-from pbrl_control.admittance import Admittance, ForceGovernor, WrenchBias, grip_wrench
+from pbrl_control.admittance import HeldGrip, WrenchBias
 from pbrl_control.kinematics import SIDES, GripperState, RobotKinematics
 from pbrl_control.limits import WIDTH, BodyGate, usable_period
-from pbrl_control.planar import Array, shift, turn, wrap
+from pbrl_control.planar import Array, turn
 from pbrl_control.settings import ControllerSettings
 from pbrl_control.types import (
     BodyCommand,
     BodyState,
-    Hold,
     Holds,
     PlanarTwist,
     Twists,
@@ -30,10 +31,11 @@ from pbrl_control.types import (
 from pbrl_control.whole_body.program import Solution, WholeBodyProgram
 from pbrl_control.whole_body.pseudo_inverse import PseudoInverse
 from pbrl_control.whole_body.steering import steering_of
+from pbrl_control.whole_body.steering_kernel import carried_frame
 from pbrl_control.whole_body.task import Task, levelling
 
 MIRROR = np.array([1.0, -1.0, -1.0])  # left home to right home
-FASTEST = 1.0  # [m/s] no gripper goes faster than this
+UNFELT = np.full(6, math.nan)  # of a wrist whose sensor has said nothing
 NOT_SOLVED = "whole-body program: expected a solution, got none; is a joint far outside of its limits?"
 
 
@@ -45,7 +47,7 @@ class BodyController:
         settings: gains and limits.
 
     Attributes:
-        share: of the asked twist that the last tick did, 0 to 1.
+        share: of the asked twist that the last tick did, 0 to 1; 1 where nothing was asked.
     """
 
     def __init__(self, kinematics: RobotKinematics, settings: ControllerSettings) -> None:
@@ -56,11 +58,10 @@ class BodyController:
         self._way = WholeBodyProgram(settings) if settings.method == "program" else PseudoInverse(settings)
         self._steering = steering_of(settings.base)
         self._bias = {side: WrenchBias(settings.compliance.bias_time) for side in SIDES}
-        self._grips: dict[str, tuple[str, Admittance]] = {}
-        self._governors: dict[str, ForceGovernor] = {}
-        nominal, stowed, home = (np.array(part) for part in (settings.nominal, settings.stowed, settings.home))
-        self._nominal, self._stowed = np.stack([nominal, -nominal]), np.stack([stowed, -stowed])
+        self._grips: dict[str, HeldGrip] = {}
+        home = np.array(settings.home)
         self._home = {"left": home, "right": home * MIRROR}
+        self._draws = {busy: _draw(settings, busy) for busy in product((False, True), repeat=len(SIDES))}
 
     def tick(self, state: BodyState, object_twist: Twists, grasps: Holds, wrenches: Wrenches, dt: float) -> BodyCommand:
         """Return what the body does for the next `dt`.
@@ -111,6 +112,7 @@ class BodyController:
 
     def stand(self, report: str) -> BodyCommand:
         """Return rest, and why; what comes next begins from rest."""
+        self.share = 0.0 if report else 1.0
         self._gate.stop()
         self._steering.stop()
         return BodyCommand(report=report)
@@ -123,11 +125,8 @@ class BodyController:
                 self._grips.pop(side, None)
                 if side in wrenches:
                     self._bias[side].update(wrenches[side], dt)
-            elif self._grips.get(side, ("",))[0] != hold.object:
-                gripper = grippers[side]
-                grip = Admittance(self.settings.compliance, gripper.planar, gripper.height)
-                self._grips[side] = (hold.object, grip)
-                self._governors[side] = ForceGovernor(self.settings.program, FASTEST)
+            elif side not in self._grips or self._grips[side].target != hold.object:
+                self._grips[side] = HeldGrip(side, hold.object, self.settings, grippers[side])
 
     def _tasks(
         self,
@@ -140,8 +139,8 @@ class BodyController:
         tasks = {}
         for side, gripper in grippers.items():
             if side in holds:
-                hold = holds[side]
-                tasks[side] = self._held_task(side, gripper, twists[hold.object], hold, wrenches, dt)
+                hold, raw, bias = holds[side], wrenches.get(side, UNFELT), self._bias[side].mean
+                tasks[side] = self._grips[side].task(gripper, twists[hold.object], hold, raw, bias, dt)
             elif gripper_frame(side) in twists:
                 twist = twists[gripper_frame(side)]
                 roll, pitch = levelling(gripper, self.settings.arm.level_gain)
@@ -149,31 +148,14 @@ class BodyController:
                 tasks[side] = Task(turn(twist.array(), gripper.planar[2]), twist.vz, added)
         return tasks
 
-    def _held_task(
-        self, side: str, gripper: GripperState, twist: PlanarTwist, hold: Hold, wrenches: Wrenches, dt: float
-    ) -> Task:
-        yaw = gripper.planar[2]
-        wanted = turn(shift(twist.array(), hold.contact), yaw + hold.yaw)
-        grip = self._grips[side][1]
-        raw = wrenches.get(side, np.full(6, np.nan))
-        wrench = grip_wrench(side, gripper, self._bias[side].remove(raw))
-        unexpected = wrench
-        if hold.expected is not None:
-            # The object pushes back with what moving it takes; only to the rest is yielded, and that firmly.
-            unexpected = wrench + np.array([*turn(hold.expected, hold.yaw), 0.0])
-        yielded, lift = grip.step(unexpected, dt, firm=hold.expected is not None)
-        lift += self.settings.arm.height_gain * (grip.height - gripper.height)
-        vx, vy, omega = turn(yielded, yaw)
-        roll, pitch = levelling(gripper, self.settings.arm.level_gain)
-        against, room = self._governors[side].step(turn(wrench[:3], yaw)[:2], dt)
-        return Task(wanted, 0.0, np.array([vx, vy, lift, roll, pitch, omega]), against, room)
-
     def _move(
         self, state: BodyState, grippers: Mapping[str, GripperState], tasks: Mapping[str, Task], dt: float
     ) -> BodyCommand:
         joints = np.concatenate((state.posture.left, state.posture.right))
         low, high = self._gate.range(joints, dt)
-        base_wish, arm_wish = self._base_wish(grippers, tasks), self._arm_wish(joints, tasks)
+        target, gain, most = self._draws[tuple(side in tasks for side in SIDES)]
+        arm_wish = np.minimum(np.maximum(gain * (target - joints), -most), most)
+        base_wish = self._base_wish(grippers, tasks)
         found = self._way.solve(grippers, tasks, base_wish, arm_wish, low, high)
         if found is None:
             return self.stand(NOT_SOLVED)
@@ -188,35 +170,13 @@ class BodyController:
         """Return the (2,) base velocity that steering has in mind; rest where nothing is asked to move."""
         if not any(task.wanted.any() for task in tasks.values()):
             return np.zeros(2)
-        count = len(tasks)
-        home, away = np.zeros(3), np.zeros(3)
-        for side in tasks:
-            own = self._home_of(side)
-            off = grippers[side].planar - own
-            off[2] = wrap(float(off[2]))
-            home += own / count
-            away += off / count
-        carried = home + away
-        twist = np.zeros(3)
-        for side, task in tasks.items():
-            twist += shift(task.wanted, carried[:2] - grippers[side].planar[:2]) / count
+        rows = [(grippers[side].planar, self._home_of(side), task.wanted) for side, task in tasks.items()]
+        carried, twist, home = carried_frame(np.concatenate([each for row in rows for each in row]).reshape(-1, 3, 3))
         return self._steering.wish(carried, twist, home)
 
     def _home_of(self, side: str) -> Array:
         """Return the (3,) place of a gripper in `base` that the base keeps it at: of a grip, where it closed."""
-        return self._grips[side][1].home if side in self._grips else self._home[side]
-
-    def _arm_wish(self, joints: Array, tasks: Mapping[str, Task]) -> Array:
-        """Return the (14,) joint rates towards the nominal posture, or of an arm without a task the stowed one."""
-        arm = self.settings.arm
-        wish = np.zeros(14)
-        for k, side in enumerate(SIDES):
-            own = slice(7 * k, 7 * k + 7)
-            if side in tasks:
-                wish[own] = _bounded(arm.posture_gain * (self._nominal[k] - joints[own]), arm.posture_speed)
-            elif self.settings.stow_idle_arm:
-                wish[own] = _bounded(self._stowed[k] - joints[own], arm.stow_speed)
-        return wish
+        return self._grips[side].home if side in self._grips else self._home[side]
 
     def _drive(self, state: BodyState, twist: PlanarTwist, dt: float) -> BodyCommand:
         """Drive the base alone, arms at rest."""
@@ -226,5 +186,16 @@ class BodyController:
         return self._command(Solution(velocity, 1.0), low, high)
 
 
-def _bounded(values: Array, most: float) -> Array:
-    return np.minimum(np.maximum(values, -most), most)
+def _draw(settings: ControllerSettings, busy: tuple[bool, ...]) -> tuple[Array, Array, Array]:
+    """Return where arms are drawn to (14,) [rad], how (14,) [1/s] and how fast at most (14,) [rad/s].
+
+    Args:
+        settings: of postures and gains.
+        busy: of the left and the right arm, whether it has a task: then to the nominal posture, else to the stowed one.
+    """
+    arm, targets, gains, most = settings.arm, [], [], []
+    for has_task, sign in zip(busy, (1.0, -1.0), strict=True):
+        targets.append(sign * np.array(settings.nominal if has_task else settings.stowed))
+        gains += 7 * [arm.posture_gain if has_task else float(settings.stow_idle_arm)]
+        most += 7 * [arm.posture_speed if has_task else arm.stow_speed]
+    return np.concatenate(targets), np.array(gains), np.array(most)

@@ -53,6 +53,7 @@ class Percept:
         wrenches: raw wrist sensor (6,) force then torque in `<side>_ft`, by gripper.
         grips: closed grippers.
         bodies: known geometry by name.
+        share: of the last command that the body controller could do, 0 to 1.
     """
 
     posture: Posture | None = None
@@ -60,6 +61,7 @@ class Percept:
     wrenches: Mapping[str, Array] = field(default_factory=dict)
     grips: Mapping[str, Grip] = field(default_factory=dict)
     bodies: Mapping[str, BodyShape] = field(default_factory=dict)
+    share: float = 1.0
 
 
 def gripper_tag(side: str) -> str:

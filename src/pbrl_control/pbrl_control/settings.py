@@ -74,8 +74,8 @@ class ProgramSettings(Section):
     """Weights and borders of the whole-body program. Weights are against 1 for a gripper's speed squared."""
 
     share: Positive = 2e-3  # of doing all of the asked twist now, against a speed error as long as the twist itself
-    base_forward: Positive = 3e-2  # of the base's speed beside the steering's
-    base_yaw: Positive = 1e-2  # [m^2/rad^2] of its yaw rate
+    base_forward: Positive = 4e-4  # of the base's speed beside the steering's
+    base_yaw: Positive = 2e-4  # [m^2/rad^2] of its yaw rate
     joints: Positive = 5e-7  # [m^2/rad^2] of rates of an arm that works, beside the draw to its posture
     idle_joints: Positive = 1e-2  # [m^2/rad^2] of one that does not
     angular_length: Positive = 0.5  # [m] at which an angular speed of a gripper counts as a linear one

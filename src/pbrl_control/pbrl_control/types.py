@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -31,7 +32,7 @@ class PlanarTwist:
 
     def finite(self) -> bool:
         """Say whether no component is NaN or infinite."""
-        return bool(np.isfinite([self.vx, self.vy, self.omega, self.vz]).all())
+        return all(map(math.isfinite, (self.vx, self.vy, self.omega, self.vz)))
 
     def moves(self) -> bool:
         """Say whether any component is not zero."""
@@ -58,7 +59,7 @@ class Hold:
     def usable(self) -> bool:
         """Say whether no number of it is NaN or infinite."""
         parts = [*self.contact, self.yaw, *(() if self.expected is None else self.expected)]
-        return bool(np.isfinite(parts).all())
+        return all(map(math.isfinite, parts))
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class BodyState:
 
     def finite(self) -> bool:
         """Say whether no joint position is NaN or infinite."""
-        return bool(np.isfinite(self.posture.vector()).all())
+        return all(map(math.isfinite, self.posture.vector().tolist()))
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pbrl_control.constraints.object_model import ObjectModel
+from pbrl_control.constraints.object_model import ObjectModel, SwivelCasters
 from pbrl_control.constraints.twist import achievable_twist
 from pbrl_control.constraints.wrench import expected_grip_wrench, total_wrench
 from pbrl_control.errors import ControlError
@@ -145,6 +146,43 @@ def test_a_table_turned_about_its_locked_caster_needs_but_little(table) -> None:
     assert np.hypot(*with_it[0, :2]) < 12.0
     assert np.abs(with_it[0, 2]) < 0.2, "plates carry hardly any torque"
     assert np.hypot(*fought[0, :2]) > 50.0
+
+
+def with_casters(model: ObjectModel, friction: float = 0.07, share: float = 0.25) -> ObjectModel:
+    corners = np.array([[0.315, 0.69], [0.315, -0.69], [-0.315, 0.69], [-0.315, -0.69]])
+    return replace(model, casters=SwivelCasters(corners, friction, share))
+
+
+def test_casters_that_stand_across_resist_where_they_are(table) -> None:
+    model, mass = with_casters(table(mass=30.0, mu_ground=0.0)), 30.0
+    contact, still = model.com[None], np.zeros(3)
+    straight = expected_grip_wrench(model, None, np.array([0.1, 0.0, 0.0]), still, contact, across=True)
+    np.testing.assert_allclose(straight, [[0.07 * mass * 9.81, 0.0, 0.0]], atol=1e-9)
+    turned = expected_grip_wrench(model, None, np.array([0.0, 0.0, 0.1]), still, contact, across=True)
+    lever = math.hypot(0.315, 0.69)
+    np.testing.assert_allclose(turned, [[0.0, 0.0, 0.07 * mass * 9.81 * lever]], atol=1e-9)
+    assert not expected_grip_wrench(model, None, still, still, contact, across=True).any(), "at rest they do not"
+    np.testing.assert_array_equal(
+        expected_grip_wrench(model, None, np.array([0.1, 0.0, 0.0]), still, contact), np.zeros((1, 3))
+    )
+
+
+def test_one_that_is_turned_about_does_not_resist(table) -> None:
+    model = with_casters(table(mass=30.0, mu_ground=0.0))
+    about = np.array([-0.315, -0.69])
+    twist = shift(np.array([0.0, 0.0, 0.1]), -about)
+    total = total_wrench(TWO, expected_grip_wrench(model, None, twist, np.zeros(3), TWO, across=True), about)
+    levers = [np.hypot(0.63, 1.38), 0.63, 1.38]
+    assert total[2] == pytest.approx(0.07 * 0.25 * 30.0 * 9.81 * sum(levers))
+
+
+@pytest.mark.parametrize(
+    ("places", "friction", "share"),
+    [(np.zeros(2), 0.07, 0.25), (np.full((1, 2), math.nan), 0.07, 0.25), (TWO, 0.0, 0.25), (TWO, 0.07, math.inf)],
+)
+def test_casters_that_are_none_are_refused(places: Array, friction: float, share: float) -> None:
+    with pytest.raises(ControlError, match="casters: expected"):
+        SwivelCasters(places, friction, share)
 
 
 def test_rest_needs_nothing(draw, place) -> None:

@@ -124,6 +124,26 @@ def test_a_perfect_object_keeps_time_and_ends_within_tolerance(rng: np.random.Ge
     assert np.hypot(steps[:, 0], steps[:, 1]).max() <= 0.3 * DT + 1e-12
 
 
+def test_what_the_body_could_not_do_is_not_summed_up(rng: np.random.Generator) -> None:
+    """A body that did nothing for two seconds: afterwards the object is not shot past its goal."""
+
+    def ends_at(said: float) -> float:
+        follower, plant = TrajectoryFollower(straight((0.3, 0.0, 0.0)), limits=AbortLimits(stall_time=10.0)), Plant()
+        past = 0.0
+        for tick in range(int(30.0 / DT)):
+            stands = 0.5 < tick * DT < 2.5
+            command = follower.tick(tick * DT, plant.tag(tick * DT, rng), {}, said if stands else 1.0)
+            if command.finished:
+                break
+            plant.step(PlanarTwist() if stands else command.twist)
+            past = max(past, float(compose(inverse(START), plant.pose)[0]) - 0.3)
+        assert command.state == FollowState.DONE
+        return past
+
+    told, untold = ends_at(0.0), ends_at(1.0)
+    assert told < 0.5 * untold
+
+
 def test_the_setpoint_waits_for_a_slow_object(rng: np.random.Generator) -> None:
     path, plant = straight(), Plant(share=0.5)
     command, history, time = run(TrajectoryFollower(path), plant, rng)

@@ -10,7 +10,7 @@ import pytest
 from pbrl_control.planar import compose, inverse, rotation, shift, turn, wrap
 from pbrl_control.settings import BaseSettings
 from pbrl_control.whole_body.steering import Predictive, Steering, steering_of, unsteered
-from pbrl_control.whole_body.steering_kernel import steer
+from pbrl_control.whole_body.steering_kernel import carried_frame, steer
 
 HOME = np.array([0.74, 0.0, 0.0])
 SETTINGS = BaseSettings()
@@ -115,3 +115,19 @@ def test_a_stopped_steering_begins_anew() -> None:
     steering.wish(HOME + 0.1, np.array([-0.1, 0.1, 0.1]), HOME)
     steering.stop()
     np.testing.assert_array_equal(steering.wish(*task), fresh.wish(*task))
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_carried_frame_is_the_plain_formula(count: int) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        rows = rng.normal(size=(count, 3, 3))
+        rows[:, :2, 2] *= 2.0
+        carried, twist, home = carried_frame(rows)
+        places, homes, asked = rows.transpose(1, 0, 2)
+        away = places - homes
+        away[:, 2] = [wrap(angle) for angle in away[:, 2]]
+        np.testing.assert_allclose(home, homes.mean(0), atol=1e-12)
+        np.testing.assert_allclose(carried, homes.mean(0) + away.mean(0), atol=1e-12)
+        shifted = [shift(each, carried[:2] - place[:2]) for each, place in zip(asked, places, strict=True)]
+        np.testing.assert_allclose(twist, np.mean(shifted, 0), atol=1e-12)

@@ -7,6 +7,7 @@ its casters, which one is locked); nothing else of the scene's concealed part is
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ from krang_sim.session import KrangSession
 from pbrl_bringup.manipulation import Manipulation
 from pbrl_bringup.paths import config_file
 from pbrl_control.admittance import WrenchBias
-from pbrl_control.constraints.object_model import ObjectModel
+from pbrl_control.constraints.object_model import ObjectModel, SwivelCasters
 from pbrl_control.kinematics import SIDES
 from pbrl_control.planar import compose, inverse, wrap
 from pbrl_control.push import Phase
@@ -36,6 +37,14 @@ ROLLING, LOCKED = 0.02, 0.175
 """Friction of four casters that roll, and of one of four that is locked: its quarter of the load on rubber."""
 CASTER = (-0.315, -0.69)
 """Of the locked one, in the table's frame [m]."""
+CORNERS = ((0.315, 0.69), (0.315, -0.69), (-0.315, 0.69), CASTER)
+SWING = 0.07
+"""Force over load that swings a caster of the table's make round: its bearing's 0.04 N m and 0.7 * 2 mm of its load of
+scrub, over its trail of 28 mm; and rolling resistance at right angles to that."""
+APART = 0.25
+"""Of each grip from the middle of the edge [m]: casters that swing round resist a turn by some 15 N m."""
+HALL = ((-4.0, -4.0), (6.0, -4.0), (6.0, 4.0), (-4.0, 4.0))
+"""Walls [m]: the robot backs by a metre and more."""
 LONGEST = 150.0
 """Simulated time after which a trial has failed [s]."""
 KINDS = ("straight", "arc", "in place", "sideways")
@@ -81,11 +90,11 @@ def free_path(seed: int, number: int) -> PathTrial:
     else:
         ways = [[0.0, sign * rng.uniform(0.15, 0.4), 0.0]]
     grips: list[dict[str, Any]] = [
-        {"gripper": "left", "point": [-0.375, 0.16]},
-        {"gripper": "right", "point": [-0.375, -0.16]},
+        {"gripper": "left", "point": [-0.375, APART]},
+        {"gripper": "right", "point": [-0.375, -APART]},
     ]
     plan = _plan(kind, grips, waypoints=ways)
-    model = _model(BodyParameters(mass=MASS, mu_ground=ROLLING))
+    model = _model(BodyParameters(mass=MASS, mu_ground=ROLLING), CORNERS)
     return _run("free_table", plan, model, seed=int(rng.integers(2**31)), kind=kind)
 
 
@@ -96,7 +105,8 @@ def locked_path(seed: int, number: int) -> PathTrial:
     wanted = [[rng.uniform(0.2, 0.6), rng.uniform(-0.1, 0.1), -turned * rng.uniform(0.5, 1.0)]]
     plan = _plan("locked caster", [{"gripper": "left", "point": [-0.375, rng.uniform(0.2, 0.5)]}], waypoints=wanted)
     wheel = {"wheel_x": CASTER[0], "wheel_y": CASTER[1], "mu_x": LOCKED, "mu_y": LOCKED}
-    model = _model(BodyParameters(mass=MASS, mu_ground=ROLLING, **wheel))
+    swivels = [corner for corner in CORNERS if corner != CASTER]
+    model = _model(BodyParameters(mass=MASS, mu_ground=ROLLING, **wheel), swivels)
     return _run("locked_caster", plan, model, seed=int(rng.integers(2**31)), kind="locked caster")
 
 
@@ -104,9 +114,10 @@ def _plan(name: str, grips: list[dict[str, Any]], **more: object) -> TrajectoryP
     return TrajectoryPlan.model_validate({"name": name, "object": TABLE, "grips": grips, **more})
 
 
-def _model(parameters: BodyParameters) -> ObjectModel:
+def _model(parameters: BodyParameters, swivels: Sequence[tuple[float, float]]) -> ObjectModel:
     x, y = 0.5 * SIZE[0], 0.5 * SIZE[1]
-    return ObjectModel.uniform(parameters, np.array([[-x, -y], [x, -y], [x, y], [-x, y]]))
+    casters = SwivelCasters(np.array(swivels), SWING, 1.0 / len(CORNERS))
+    return ObjectModel.uniform(parameters, np.array([[-x, -y], [x, -y], [x, y], [-x, y]]), casters)
 
 
 class _Watched(Manipulation):
@@ -138,8 +149,17 @@ class _Watched(Manipulation):
         self.force = max(self.force, self._smooth[observation.side])
 
 
+def _in_a_hall(scene: Scene, plan: TrajectoryPlan) -> Scene:
+    """Return a scene without near walls, and the robot square before its grips, as one that drove there would be."""
+    x, y, yaw = scene.robot.pose
+    if len(plan.grips) > 1:
+        y = scene.bodies[TABLE].pose[1] + float(np.mean([grip.point[1] for grip in plan.grips]))
+    robot = scene.robot.model_copy(update={"pose": (x, y, yaw)})
+    return scene.model_copy(update={"robot": robot, "room": scene.room.model_copy(update={"outline": HALL})})
+
+
 def _run(scene_name: str, plan: TrajectoryPlan, model: ObjectModel, *, seed: int, kind: str) -> PathTrial:
-    scene: Scene = load_scene(config_file("scenes", scene_name))
+    scene = _in_a_hall(load_scene(config_file("scenes", scene_name)), plan)
     course = TrajectoryCourse(plan, model)
     with KrangSession(scene, seed=seed) as session:
         trial = _Watched(session, plan, course)

@@ -19,6 +19,35 @@ NOT_NEGATIVE = ("mu_x", "mu_y", "mu_ground", "hinge_radius")
 
 
 @dataclass(frozen=True)
+class SwivelCasters:
+    """Casters that swing round, where they are known: they resist most while they stand across the motion.
+
+    A caster that stands across rolls round its own contact until it trails. Its bearing's torque and its tread's scrub
+    are then overcome at the lever of its trail: several times the rolling resistance.
+
+    Attributes:
+        places: (n, 2) of the swivel axes in the object's frame [m].
+        friction: force across its heading that swings one, over what it carries:
+            (bearing torque / load + scrub torque / load) / trail.
+        share: of the object's weight that each carries.
+
+    Raises:
+        ControlError: the places are not (n, 2) and finite, or a number is not above zero.
+    """
+
+    places: Array
+    friction: float
+    share: float
+
+    def __post_init__(self) -> None:
+        if np.ndim(self.places) != 2 or np.shape(self.places)[1] != 2 or not np.isfinite(self.places).all():
+            raise ControlError(f"casters: expected finite places of shape (n, 2), got {np.shape(self.places)}")
+        for name, value in (("friction", self.friction), ("share", self.share)):
+            if not (np.isfinite(value) and value > 0.0):
+                raise ControlError(f"casters: expected {name} above zero, got {value}")
+
+
+@dataclass(frozen=True)
 class ObjectModel:
     """One object: the learned parameters of `pbrl_model` and its mass distribution.
 
@@ -27,12 +56,14 @@ class ObjectModel:
         footprint: (k, 2) outline in the object's frame [m].
         com: (2,) centre of mass in the object's frame [m].
         inertia_per_mass: moment of inertia about the centre of mass over the mass [m^2].
+        casters: that swing round, where they are known beside what was learned.
     """
 
     parameters: BodyParameters
     footprint: Array
     com: Array
     inertia_per_mass: float
+    casters: SwivelCasters | None = None
 
     def __post_init__(self) -> None:
         check_parameters(self.parameters)
@@ -42,7 +73,7 @@ class ObjectModel:
             raise ControlError(f"object model: expected com as two finite numbers [m], got {self.com}")
 
     @classmethod
-    def uniform(cls, parameters: BodyParameters, footprint: ArrayLike) -> Self:
+    def uniform(cls, parameters: BodyParameters, footprint: ArrayLike, casters: SwivelCasters | None = None) -> Self:
         """Make the model of a body of uniform density over its footprint (k, 2) [m] (thesis 5.3.1).
 
         Raises:
@@ -53,7 +84,7 @@ class ObjectModel:
             mass = mass_properties(outline)
         except ModelError as error:
             raise ControlError(f"object model: {error}") from error
-        return cls(parameters, outline, mass.com, mass.inertia_per_mass)
+        return cls(parameters, outline, mass.com, mass.inertia_per_mass, casters)
 
     @property
     def mass(self) -> float:

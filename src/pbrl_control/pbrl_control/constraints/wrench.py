@@ -39,6 +39,8 @@ def expected_grip_wrench(
     rate: Array,
     contacts: Array,
     settings: ConstraintSettings = DEFAULTS,
+    *,
+    across: bool = False,
 ) -> Array:
     """Return the wrench (n, 3) that each grip applies to the object: fx, fy [N], tau [N m] at its contact, object axes.
 
@@ -52,6 +54,7 @@ def expected_grip_wrench(
         rate: (3,) how the components of that twist change [m/s^2, rad/s^2]; zero on a steady arc.
         contacts: (n, 2) where the grips hold it, in the object's frame [m].
         settings: for the torque arm.
+        across: as if all casters that are known stood across their motion and had to swing round: the most they resist.
 
     Raises:
         ControlError: an input has another shape or is not finite, or a pose is needed and there is none.
@@ -63,7 +66,10 @@ def expected_grip_wrench(
     transfer = _transfer(levers)
     weights = np.tile([1.0, 1.0, 1.0 / settings.torque_arm**2], len(points))
     shared = np.linalg.inv((transfer / weights) @ transfer.T)
-    total = _least_total(model, pose, velocity, change, np.linalg.cholesky(shared).T)
+    needed, reactions = _needed(model, pose, velocity, change)
+    if across:
+        needed = needed + _swinging(model, velocity, change)
+    total = _least_total(needed, reactions, np.linalg.cholesky(shared).T)
     return ((transfer.T @ (shared @ total)) / weights).reshape(-1, 3)
 
 
@@ -78,9 +84,8 @@ def _transfer(levers: Array) -> Array:
     return np.hstack(blocks)
 
 
-def _least_total(model: ObjectModel, pose: Array | None, velocity: Array, change: Array, root: Array) -> Array:
+def _least_total(needed: Array, reactions: Reactions, root: Array) -> Array:
     """Return the wrench (3,) at the centre of mass with the least norm |root @ wrench| that makes the motion."""
-    needed, reactions = _needed(model, pose, velocity, change)
     if not len(reactions.rows):
         return needed
     bounds = (-reactions.limits, reactions.limits)
@@ -113,6 +118,22 @@ def _feet(model: ObjectModel, velocity: Array, change: Array, spread: Array) -> 
         if size > rest:
             return model.parameters.mu_ground * model.mass * GRAVITY * spread * motion / size
     return np.zeros(3)
+
+
+def _swinging(model: ObjectModel, velocity: Array, change: Array) -> Array:
+    """Return the wrench (3,) at the centre of mass against casters that stand across; none where none are known."""
+    total = np.zeros(3)
+    if model.casters is None:
+        return total
+    limit = model.casters.friction * model.casters.share * model.mass * GRAVITY
+    for place in model.casters.places - model.com:
+        for motion, rest in ((velocity, REST_SPEED), (change, REST_RATE)):
+            moved = motion[:2] + motion[2] * np.array([-place[1], place[0]])
+            size = float(np.hypot(*moved))
+            if size > rest:
+                total += direction_row(place, moved) * (limit / size)
+                break
+    return total
 
 
 def _slipping(speed: float, rate: float) -> float:

@@ -1,13 +1,18 @@
 """Node around `BodyController`: /object_twist_command in, /cmd_vel and arm velocities out.
 
-It ticks with every /joint_states message, so at that topic's rate and on its clock, simulated or not. When
+It ticks with every /joint_states message, so at that topic's rate and on its clock, simulated or not; or, with `rate`,
+so many times a second of the wall clock with the newest one, for a robot or a simulator that runs in real time. When
 joint states cease nothing is sent any more, and base and arms stop by their own watchdogs. While /emergency_stop
-(std_msgs/Bool) is true the robot rests, whatever is commanded; /body_controller/status says why it rests.
+(std_msgs/Bool) is true the robot rests, whatever is commanded; /body_controller/status says why it rests, and
+/body_controller/share with every command, how much of the asked twist is done by it.
 """
 
 from __future__ import annotations
 
+import gc
 import sys
+import threading
+import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,18 +21,21 @@ import numpy as np
 import rclpy
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, WrenchStamped
 from pbrl_msgs.msg import Grasps, Scene
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Float64MultiArray, String
+from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
 from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
-from pbrl_bag.ros.stopping import init_until_signal, spin_until
+from pbrl_bag.ros.stopping import WAIT, init_until_signal
 from pbrl_control.controller import BodyController
 from pbrl_control.errors import ControlError
 from pbrl_control.installed import params_folder
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
+from pbrl_control.limits import LONGEST
 from pbrl_control.percept import Grip, Percept, Tag, gripper_tag, holds_of
 from pbrl_control.planar import Array
 from pbrl_control.ros.conversions import (
@@ -58,6 +66,8 @@ class BodyControllerNode(Node):
     def __init__(self) -> None:
         super().__init__("body_controller_node")
         path = declare(self, "settings", "", "YAML of gains and limits; empty: body_controller.yaml as installed")
+        rate = "ticks a second of the wall clock [Hz]; 0: with every /joint_states"
+        self._rate: float = declare(self, "rate", 0.0, rate, (0.0, 1000.0))
         refuse_unknown(self)
         file = Path(path) if path else params_folder("settings") / "body_controller.yaml"
         self._settings = load_section(file, ControllerSettings, "settings")
@@ -71,12 +81,16 @@ class BodyControllerNode(Node):
         self._expected: dict[str, tuple[float, str, Array]] = {}
         self._tags: dict[str, Tag] = {}
         self._tag_topics: set[str] = set()
+        self._joints: JointState | None = None
+        self._heard = 0.0
         self._last: float | None = None
         self._moving = False
         self._in_motion = self._arms_in_motion = False
         self._report = ""
         self._create_publishers()
         self._create_subscriptions()
+        if self._rate:
+            self.create_timer(1.0 / self._rate, self._on_time, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _create_publishers(self) -> None:
         self._base = self.create_publisher(Twist, "/cmd_vel", COMMANDS)
@@ -85,6 +99,7 @@ class BodyControllerNode(Node):
             for side in SIDES
         }
         self._status = self.create_publisher(String, "/body_controller/status", LATCHED)
+        self._share = self.create_publisher(Float64, "/body_controller/share", COMMANDS)
 
     def _create_subscriptions(self) -> None:
         self.create_subscription(String, "/robot_description", self._on_description, LATCHED)
@@ -138,10 +153,19 @@ class BodyControllerNode(Node):
         self._watch.feed(_tag_stream(name), self._now(), np.array([tag.time]), moving=self._in_motion)
 
     def _on_joints(self, message: JointState) -> None:
-        stamp = seconds(message.header.stamp)
-        dt, self._last = stamp - (stamp if self._last is None else self._last), stamp
+        self._joints, self._heard = message, time.monotonic()
+        if not self._rate:
+            self._step(message, seconds(message.header.stamp))
+
+    def _on_time(self) -> None:
+        now = time.monotonic()
+        if self._joints is not None and now - self._heard < self._settings.timeout:
+            self._step(self._joints, now)
+
+    def _step(self, message: JointState, now: float) -> None:
+        dt, self._last = now - (now if self._last is None else self._last), now
         if self._controller is not None and dt > 0.0:
-            self._send(self._tick(self._controller, message, min(dt, 0.1)))
+            self._send(self._tick(self._controller, message, min(dt, LONGEST)), self._controller)
 
     def _tick(self, controller: BodyController, message: JointState, dt: float) -> BodyCommand | None:
         """Return what to send; None where nobody commands anything."""
@@ -156,7 +180,7 @@ class BodyControllerNode(Node):
             holds = self._with_expected(holds_of(Percept(posture, self._tags, self._wrenches, self._grips)))
             command = controller.tick(BodyState(posture), twists, holds, self._wrenches, dt)
         except ControlError as error:
-            return BodyCommand(report=str(error))
+            return controller.stand(str(error))
         return command if twists or command.report else None
 
     def _with_expected(self, holds: dict[str, Hold]) -> dict[str, Hold]:
@@ -176,7 +200,7 @@ class BodyControllerNode(Node):
             needed += [_wrench_stream(side), _tag_stream(grip.object), _tag_stream(gripper_tag(side))]
         return self._watch.complaint(now, needed)
 
-    def _send(self, command: BodyCommand | None) -> None:
+    def _send(self, command: BodyCommand | None, controller: BodyController) -> None:
         """Publish a command; when commands cease, one that stops everything, and then leave the drives alone."""
         if command is None and not self._moving:
             return
@@ -187,6 +211,7 @@ class BodyControllerNode(Node):
         self._base.publish(base_to_msg(command.base_v, command.base_w))
         for side in SIDES:
             self._arms[side].publish(arm_to_msg(command.arm(side)))
+        self._share.publish(Float64(data=controller.share))
         if command.report != self._report:
             self._report = command.report
             self._status.publish(String(data=command.report or "ok"))
@@ -205,13 +230,31 @@ def _tag_stream(name: str) -> str:
     return f"tag {name!r}"
 
 
+def _spin(node: Node, stop: threading.Event) -> None:
+    """Handle what comes, in the order in which it comes, until `stop` is set.
+
+    rclpy's usual executor lays a new set of everything to wait for whenever it has handled what was there: that is half
+    of this node's work, and ticks come late by it.
+    """
+    gc.collect()
+    gc.freeze()  # what there is by now stays: looking through it again would hold up a tick
+    executor = EventsExecutor()
+    executor.add_node(node)
+    try:
+        while rclpy.ok() and not stop.is_set():
+            executor.spin_once(timeout_sec=WAIT)
+    finally:
+        executor.remove_node(node)
+        executor.shutdown()
+
+
 def main() -> None:
     """Run the node until it is told to stop."""
     node = None
     try:
         stop = init_until_signal()
         node = BodyControllerNode()
-        spin_until(node, stop.is_set)
+        _spin(node, stop)
     except (ControlError, BagError) as error:
         print(f"body_controller_node: {error}", file=sys.stderr)
         sys.exit(2)

@@ -52,6 +52,8 @@ def peak_grip_force(
 ) -> float:
     """Return the largest horizontal force that any grip has to exert along a trajectory [N] (thesis 6.4).
 
+    Which way casters stand at the start nobody knows: those of a model that has some are taken to stand across.
+
     Args:
         trajectory: one that the constraints allow.
         model: the object's physics.
@@ -64,6 +66,6 @@ def peak_grip_force(
     largest = 0.0
     for time in np.arange(0.5 * FORCE_STEP, trajectory.duration, FORCE_STEP):
         point = trajectory.at(float(time))
-        wrench = expected_grip_wrench(model, point.pose, point.twist, point.rate, contacts, settings)
+        wrench = expected_grip_wrench(model, point.pose, point.twist, point.rate, contacts, settings, across=True)
         largest = max(largest, float(np.hypot(wrench[:, 0], wrench[:, 1]).max()))
     return largest

@@ -37,7 +37,7 @@ class TrajectoryCourse:
             if tag is None:
                 return CourseStep(PlanarTwist(), "waiting for a tag of the object")
             self.follower = self._set_out(percept)
-        command = self.follower.tick(now, tag, forces)
+        command = self.follower.tick(now, tag, forces, percept.share)
         if command.state == FollowState.ABORTED:
             raise ControlError(command.status)
         return CourseStep(command.twist, command.status, command.finished, self.follower.expected_wrenches())

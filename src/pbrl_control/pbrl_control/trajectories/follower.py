@@ -159,13 +159,14 @@ class TrajectoryFollower:
         )
         return dict(zip(sides, wrenches, strict=True))
 
-    def tick(self, now: float, tag: Tag | None, forces: Forces | None = None) -> FollowCommand:
+    def tick(self, now: float, tag: Tag | None, forces: Forces | None = None, share: float = 1.0) -> FollowCommand:
         """Return what to do at `now` [s]; never raises for what it is told.
 
         Args:
             now: [s] on the clock of the tag.
             tag: latest of the object; None while none was seen.
             forces: horizontal force at each grip [N], bias removed.
+            share: of the last command that the body could do, 0 to 1: feedback is not summed up for what it could not.
         """
         if self.state in (FollowState.DONE, FollowState.ABORTED):
             return self._rest(self._reason)
@@ -177,11 +178,11 @@ class TrajectoryFollower:
             return self._abort(f"time: expected it to go on, got {self._last - now:.3f} s back; was the clock set?")
         dt, self._last = min(now - self._last, LONGEST_TICK), now
         try:
-            return self._step(now, dt, tag, forces or {})
+            return self._step(now, dt, tag, forces or {}, share)
         except ControlError as error:
             return self._abort(str(error))
 
-    def _step(self, now: float, dt: float, tag: Tag | None, forces: Forces) -> FollowCommand:
+    def _step(self, now: float, dt: float, tag: Tag | None, forces: Forces, share: float) -> FollowCommand:
         self._monitor.check_tag(now, tag, self._start)
         self._monitor.check_force(now, forces)
         self._monitor.check_time(now - self._start, self.progress)
@@ -196,7 +197,7 @@ class TrajectoryFollower:
             self._advance(now, dt)
         elif self._arrived(now):
             return self._finish()
-        return self._command(dt)
+        return self._command(dt, min(max(share, 0.0), 1.0))
 
     def _watch(self, limits: AbortLimits) -> AbortMonitor:
         force = limits.force
@@ -248,8 +249,8 @@ class TrajectoryFollower:
         self.state, self._reason = FollowState.DONE, f"done: {self._where_it_is()}{self._foreseen()}"
         return self._rest(self._reason)
 
-    def _command(self, dt: float) -> FollowCommand:
-        self._summed = self._bounded(self._summed + self.settings.integral * dt * self._error)
+    def _command(self, dt: float, share: float) -> FollowCommand:
+        self._summed = self._bounded(self._summed + share * self.settings.integral * dt * self._error)
         wanted = self._wanted()
         refused = PlanarTwist()
         self._refusal = ""

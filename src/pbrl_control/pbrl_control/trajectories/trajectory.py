@@ -36,9 +36,9 @@ class MotionLimits(Section):
     """
 
     speed: Positive = 0.15
-    yaw_rate: Positive = 0.25
+    yaw_rate: Positive = 0.2
     acceleration: Positive = 0.15
-    yaw_acceleration: Positive = 0.25
+    yaw_acceleration: Positive = 0.2
 
 
 @dataclass(frozen=True)

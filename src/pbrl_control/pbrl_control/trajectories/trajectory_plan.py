@@ -59,7 +59,7 @@ class FollowSettings(Section):
     tolerance: Positive = 0.008
     yaw_tolerance: Positive = 0.01
     settle: NotNegative = 0.5
-    settle_timeout: Positive = 4.0
+    settle_timeout: Positive = 8.0
 
 
 class AbortLimits(Section):

@@ -18,6 +18,32 @@ Array = NDArray[np.float64]
 
 
 @njit(cache=True, error_model="numpy")
+def carried_frame(grippers: Array) -> tuple[Array, Array, Array]:
+    """Return the pose (3,) in the base of the frame that grippers carry, its twist (3,) and its home (3,).
+
+    Its home is the middle of theirs, and it is as far from there as they are from theirs in the mean.
+
+    Args:
+        grippers: (n, 3, 3) of each its pose in the base, its home there, and the twist asked of it [m, rad, s].
+    """
+    count = len(grippers)
+    home, away, twist = np.zeros(3), np.zeros(3), np.zeros(3)
+    for pose, own, _ in grippers:
+        for k in range(3):
+            off = pose[k] - own[k]
+            if k == 2:
+                off = math.pi - (math.pi - off) % (2.0 * math.pi)
+            home[k] += own[k] / count
+            away[k] += off / count
+    carried = home + away
+    for pose, _, asked in grippers:
+        twist[0] += (asked[0] - asked[2] * (carried[1] - pose[1])) / count
+        twist[1] += (asked[1] + asked[2] * (carried[0] - pose[0])) / count
+        twist[2] += asked[2] / count
+    return carried, twist, home
+
+
+@njit(cache=True, error_model="numpy")
 def steer(
     carried: Array,
     twist: Array,
