@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from pbrl_control.controller import BodyController
 from pbrl_control.course import Course
@@ -10,7 +11,7 @@ from pbrl_control.errors import ControlError
 from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.kinematics import RobotKinematics
 from pbrl_control.percept import Percept, holds_of
-from pbrl_control.push import GripperAnswer, PushCommand, PushExecutive
+from pbrl_control.push import GripperAnswer, Phase, PushCommand, PushExecutive
 from pbrl_control.settings import ControllerSettings
 from pbrl_control.types import BodyCommand, BodyState
 
@@ -29,32 +30,53 @@ class LoopCommand:
     push: PushCommand
 
 
+class Executive(Protocol):
+    """Decides what the robot does: `PushExecutive`, `FetchExecutive`."""
+
+    phase: Phase
+
+    def tick(self, now: float, percept: Percept) -> PushCommand:
+        """Return what to do at `now` [s]; never raises for what it perceives."""
+        ...
+
+    def answer(self, answer: GripperAnswer) -> None:
+        """Take in what came of a gripper's request."""
+        ...
+
+
 class ControlLoop:
-    """One push, from the first percept to done or failed.
+    """One push or fetch, from the first percept to done or failed.
 
     Args:
         kinematics: of the robot.
-        plan: the push.
+        task: an executive, or the plan of a push.
         settings: of the body controller.
-        course: what the object does while it is held; None: the segments of a push plan.
+        course: what the object of a plan does while it is held; None: the segments of a push plan.
+
+    Raises:
+        ControlError: a course beside an executive, which has its own; a plan that lacks one.
     """
 
     def __init__(
         self,
         kinematics: RobotKinematics,
-        plan: GraspPlan,
+        task: GraspPlan | Executive,
         settings: ControllerSettings | None = None,
         course: Course | None = None,
     ) -> None:
+        if course is not None and not isinstance(task, GraspPlan):
+            raise ControlError(
+                "control loop: expected a course beside a plan, got one beside an executive: tell it that"
+            )
         self.controller = BodyController(kinematics, settings or ControllerSettings())
-        self.executive = PushExecutive(plan, course)
+        self.executive: Executive = PushExecutive(task, course) if isinstance(task, GraspPlan) else task
         self._last: float | None = None
 
     def tick(self, now: float, percept: Percept) -> LoopCommand:
         """Return the commands for the time from `now` [s] on; call it at 100 Hz of the clock that `now` is of."""
         dt = 0.01 if self._last is None else now - self._last
         self._last = now
-        push = self.executive.tick(now, percept)
+        push = self.executive.tick(now, replace(percept, share=self.controller.share))
         if percept.posture is None:
             return LoopCommand(BodyCommand(report="joint positions: expected some, none have been seen yet"), push)
         try:

@@ -26,6 +26,9 @@ RETREAT_SPEED = 0.08  # [m/s]
 class Phase(StrEnum):
     """Where a push is; the value is what `/push/status` says."""
 
+    LOCATE = "locate"  # this and the next two where the object is driven to first, see `fetching`
+    STOW = "stow"
+    DRIVE = "drive"
     APPROACH = "approach"
     GRASP = "grasp"
     SETTLE = "settle"

@@ -1,4 +1,4 @@
-"""The body controller: Jacobians, limits, tick, steering; and object paths in Bullet with both arms."""
+"""The body controller: Jacobians, limits, tick, steering, jitter; object paths and grasps from afar in Bullet."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from pbrl_bringup.benches.control_grasps import FAULTS, GraspTrial, grasp_trial, provoked_trial
+from pbrl_bringup.benches.control_jitter import jitter_rows
 from pbrl_bringup.benches.control_laws import (
     heading,
     jacobian_error,
@@ -20,7 +22,7 @@ from pbrl_bringup.benches.control_paths import PathTrial, free_path, locked_path
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.parallel import in_parallel
 
-POSTURES, PATHS, HOUR = 1000, 20, 3600.0
+POSTURES, PATHS, GRASPS, HOUR = 1000, 20, 40, 3600.0
 END, TURN, FORCE = 0.03, math.radians(2.0), 40.0
 """Errors of a path's end [m, rad], force at a grip [N]."""
 RATIO = 1.5
@@ -44,12 +46,15 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
         _tick_row(200 if quick else 5000),
         *_steering_rows(),
     ]
-    trials: list[PathTrial] = []
+    trials: list[PathTrial | GraspTrial] = []
     if not quick:
+        rows += jitter_rows(seed, out)
         free = in_parallel(free_path, [(seed, k) for k in range(PATHS)], "paths of a free table")
         locked = in_parallel(locked_path, [(seed, k) for k in range(PATHS)], "paths of a table with a locked caster")
-        trials = [*free, *locked]
-        rows += [*_free_rows(free), _locked_row(locked)]
+        grasps = in_parallel(grasp_trial, [(seed, k) for k in range(GRASPS)], "grasps from 1.5 m away")
+        faults = in_parallel(provoked_trial, [(seed, k) for k in range(len(FAULTS))], "grasps that must fail")
+        trials = [*free, *locked, *grasps, *faults]
+        rows += [*_free_rows(free), _locked_row(locked), *_grasp_rows(grasps, faults)]
     return Measured(rows, {"limits": excess, "trials": [asdict(trial) for trial in trials]})
 
 
@@ -97,3 +102,20 @@ def _locked_row(trials: list[PathTrial]) -> Row:
         median_ratio=float(np.nanmedian(ratios)),
         worst_ratio=float(np.nanmax(ratios)),
     )
+
+
+def _grasp_rows(grasps: list[GraspTrial], faults: list[GraspTrial]) -> list[Row]:
+    """Return how many grasps succeed, and how many failures are known as such, drawn and provoked."""
+    failed = [each for each in [*grasps, *faults] if not each.success]
+    why = {f"{each.kind}, {each.number}": each.status for each in grasps if not each.success}
+    unseen = {f"{each.kind}, {each.number}": each.status for each in failed if not each.detected}
+    return [
+        at_least("grasps of a table from 1.5 m away", sum(each.success for each in grasps), "of 40", 38, **why),
+        at_least(
+            "failures that were detected and say why",
+            sum(each.detected for each in failed),
+            f"of {len(failed)}",
+            len(failed),
+            **unseen,
+        ),
+    ]

@@ -13,6 +13,8 @@ EXPERIMENTS = {
     "sample-efficiency": "figure 24: observations needed for ten household objects",
     "noise": "figure 26: accuracy against training size and against noise",
     "robot-fits": "figure 30: tables and a cart pushed by Krang, fitted three ways",
+    "body-jacobian": "figures 36 to 38: one path with and without constraints known, with and without steering",
+    "articulation": "chapter 4: a held table is turned about points of choice; the centre found, and how far it goes",
     "limits": "what a diagnosis cannot tell, each limit measured on a recording that shows it",
     "contact": "section 6.5.3: a wheel found on a table that is only pushed by another",
 }

@@ -5,6 +5,7 @@ from pbrl_control.grasping.candidates import (
     GraspCandidate,
     GraspSearch,
     Rejection,
+    grasps_at,
     sample_grasps,
 )
 from pbrl_control.grasping.model_rules import GraspModel
@@ -17,5 +18,6 @@ __all__ = [
     "GraspSearch",
     "GraspSettings",
     "Rejection",
+    "grasps_at",
     "sample_grasps",
 ]

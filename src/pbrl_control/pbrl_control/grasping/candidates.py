@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from shapely import Polygon, orient_polygons
 
 from pbrl_control.errors import ControlError
 from pbrl_control.grasp_plan import Grip
-from pbrl_control.grasping.contacts import Hands, Reach, face_point, place_plates
+from pbrl_control.grasping.contacts import Hands, Reach, face_point, place_plates, reach_contacts
 from pbrl_control.grasping.model_rules import GraspModel, ray_hits
 from pbrl_control.grasping.settings import GraspSettings
 from pbrl_control.navigation.floor_map import FloorMap, as_polygon
@@ -140,9 +140,7 @@ def sample_grasps(
         ControlError: a pose is not finite, the object is not on the map, hands are unknown.
     """
     settings = settings or GraspSettings()
-    pose, base = _pose(pose, f"pose of {name!r}"), _pose(base, "pose of the base")
-    if name not in floor.obstacles:
-        raise ControlError(f"grasp of {name!r}: expected it on the map, got {', '.join(floor.obstacles) or 'nothing'}")
+    pose, base = _poses(name, pose, base, floor)
     unknown = [sides for sides in hands if tuple(sides) not in EVERY_HAND]
     if unknown:
         raise ControlError(f"grasp of {name!r}: expected hands out of {EVERY_HAND}, got {unknown[0]!r}")
@@ -167,6 +165,63 @@ def sample_grasps(
                 rejected.append(Rejection(tuple(sides), point, found))
     candidates = _with_paths(name, stands, base, checker, settings, int(rng.integers(1, 2**31)), rejected)
     return GraspSearch(tuple(candidates), tuple(rejected))
+
+
+def grasps_at(
+    name: str,
+    shape: BodyShape,
+    pose: Array,
+    points: Mapping[str, Array],
+    base: Array,
+    floor: FloorMap,
+    rng: np.random.Generator,
+    *,
+    robot: Footprint = KRANG_STOWED,
+    settings: GraspSettings | None = None,
+) -> GraspSearch:
+    """Find the way to a grasp whose points are told.
+
+    Args:
+        name: of the object; `floor` has it as an obstacle.
+        shape: its footprint and height.
+        pose: (3,) of it in `world` [m, rad].
+        points: (2,) by gripper, in the object's frame; the nearest points of its outline are taken [m].
+        base: (3,) where the base is, in `world`.
+        floor: room and obstacles, the object among them.
+        rng: draws the seed of the path planner.
+        robot: footprint on the way, arms stowed.
+        settings: of grippers and search.
+
+    Returns:
+        One candidate, or why there is none.
+
+    Raises:
+        ControlError: a pose is not finite, the object is not on the map.
+    """
+    settings = settings or GraspSettings()
+    pose, base = _poses(name, pose, base, floor)
+    refusal = _edge_refusal(shape, settings)
+    if refusal:
+        return GraspSearch((), (), refusal)
+    corners = np.array(orient_polygons(as_polygon(shape.footprint, name)).exterior.coords)[:-1]
+    reach = reach_contacts(corners, points, settings)
+    if isinstance(reach, str):
+        return GraspSearch((), (), reach)
+    checker = MotionChecker(floor, robot, settings.clearance)
+    middle = np.mean([reach.contacts[side] for side in reach.sides], axis=0)
+    stand = _free_stand(name, pose, reach, middle, checker, settings)
+    if isinstance(stand, str):
+        return GraspSearch((), (Rejection(reach.sides, middle, stand),))
+    rejected: list[Rejection] = []
+    found = _with_paths(name, [stand], base, checker, settings, int(rng.integers(1, 2**31)), rejected)
+    return GraspSearch(tuple(found), tuple(rejected))
+
+
+def _poses(name: str, pose: Array, base: Array, floor: FloorMap) -> tuple[Array, Array]:
+    """Return the poses (3,) of object and base as arrays; raise ControlError where one is none or it is not mapped."""
+    if name not in floor.obstacles:
+        raise ControlError(f"grasp of {name!r}: expected it on the map, got {', '.join(floor.obstacles) or 'nothing'}")
+    return _pose(pose, f"pose of {name!r}"), _pose(base, "pose of the base")
 
 
 def _pose(pose: Array, what: str) -> Array:
@@ -198,8 +253,13 @@ def _stand(
     """Return where the base stands for a grasp at a point (2,) of the outline, or why it cannot."""
     face = face_point(corners, point)
     reach = model.face_fault(face.normal) or place_plates(face, sides, settings)
-    if isinstance(reach, str):
-        return reach
+    return reach if isinstance(reach, str) else _free_stand(name, pose, reach, point, checker, settings)
+
+
+def _free_stand(
+    name: str, pose: Array, reach: Reach, point: Array, checker: MotionChecker, settings: GraspSettings
+) -> _Stand | str:
+    """Return where the base stands for a reach, or what would be in its way there."""
     grasp = compose(pose, reach.base)
     goal = compose(grasp, np.array([-settings.standoff - settings.depth, 0.0, 0.0]))
     fault = checker.pose_fault(goal) or checker.drive_fault(goal[:2], grasp[:2], float(goal[2]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from pbrl_control.planar import Array, compose, inverse, rotation
 SIGN = {"left": 1.0, "right": -1.0}
 Hands = tuple[str, ...]
 ON_FACE = 1e-6  # [m]
+SAME_FACE = 1e-3  # [m, rad] between two grips that are told
 
 
 @dataclass(frozen=True)
@@ -89,3 +91,35 @@ def place_plates(face: FacePoint, hands: Hands, settings: GraspSettings) -> Reac
         return f"face: expected {need:.2f} m about the point for two grippers side by side, got {got:.2f} m"
     contacts = {side: compose(face.pose, np.array([0.0, SIGN[side] * lateral, 0.0]))[:2] for side in hands}
     return Reach(hands, contacts, compose(face.pose, np.array([settings.depth - home_x, 0.0, 0.0])), lateral)
+
+
+def reach_contacts(footprint: Array, points: Mapping[str, Array], settings: GraspSettings) -> Reach | str:
+    """Return how hands take hold where they are told to, or why they cannot, in one line.
+
+    Args:
+        footprint: (k, 2) counter-clockwise, in the object's frame [m].
+        points: (2,) by gripper, in the object's frame [m]; the nearest points of the outline are taken.
+        settings: of grippers.
+    """
+    hands = tuple(side for side in SIGN if side in points)
+    faces = {side: face_point(footprint, points[side]) for side in hands}
+    half = settings.plate_width / 2.0 + settings.corner_margin
+    for side, face in faces.items():
+        short = min(face.left, face.right)
+        if short < half:
+            return f"corner: expected {half:.3f} m of face on either side of the {side} plates, got {short:.3f} m"
+    if len(hands) == 1:
+        return place_plates(faces[hands[0]], hands, settings)
+    left, right = faces["left"], faces["right"]
+    across = compose(inverse(right.pose), left.pose)
+    if abs(across[0]) > SAME_FACE or abs(across[2]) > SAME_FACE:
+        return "face: expected both grips on one face, got them on two; grasp with one hand or move a point"
+    lateral = 0.5 * float(across[1])
+    low, high = settings.lateral
+    if not low <= lateral <= high:
+        return (
+            f"face: expected the left grip {2 * low:.2f} to {2 * high:.2f} m left of the right, got {2 * lateral:.2f} m"
+        )
+    middle = compose(right.pose, np.array([0.0, lateral, 0.0]))
+    contacts = {side: face.pose[:2] for side, face in faces.items()}
+    return Reach(hands, contacts, compose(middle, np.array([settings.depth - settings.home[0], 0.0, 0.0])), lateral)

@@ -23,7 +23,7 @@ class GraspSettings(Section):
     opening: Positive = 0.059  # [m] between the plates
     opening_margin: NotNegative = 0.01  # [m] of it that the edge must leave
     plate_width: Positive = 0.074  # [m]
-    corner_margin: NotNegative = 0.01  # [m] between a plate and the end of the face
+    corner_margin: NotNegative = 0.09  # [m] between a plate and the end of the face: a table's legs stand under there
     edge_thickness: Positive = 0.025  # [m] of the object's edge: a table top
     clearance: NotNegative = 0.03  # [m] around the robot at the grasp and on the way there
     time_limit: Positive = 5.0  # [s] for each path

@@ -2,6 +2,9 @@
 
 With `trajectory` the object is grasped, moved as /object_models says that it can be moved, and let go. What has been
 learned of it when the grip closes counts; without a model the trajectory is followed as it is wanted.
+
+With `fetch` the robot drives there first, from anywhere in the room, and tests the grip before it moves anything; with
+`grips:=sampled` it grasps where what was learned lets it, not where the plan says.
 """
 
 from __future__ import annotations
@@ -11,19 +14,28 @@ from functools import partial
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from nav_msgs.msg import Odometry
 from pbrl_msgs.msg import Grasps, ObjectModel, ObjectModels, Scene
 from pbrl_msgs.srv import GraspObject, ReleaseObject
 from rclpy.client import Client
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.task import Future
-from std_msgs.msg import String
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, String
 
 from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.stopping import init_until_signal, spin_until
 from pbrl_control.constraints.belief import ClassBelief
+from pbrl_control.constraints.classes import Freedom
+from pbrl_control.course import Course, SegmentCourse
 from pbrl_control.errors import ControlError
+from pbrl_control.fetching import FetchExecutive, GivenGrips, SampledGrasps, grasp_model
+from pbrl_control.grasp_plan import GraspPlan
+from pbrl_control.installed import params_folder
+from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
+from pbrl_control.loop import Executive
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag
 from pbrl_control.planar import Array
 from pbrl_control.push import GripperAnswer, GripperRequest, Phase, PushCommand, PushExecutive
@@ -32,11 +44,14 @@ from pbrl_control.ros.conversions import (
     bodies_from_msg,
     expected_to_msg,
     grips_from_msg,
+    posture_from_msg,
     tag_from_msg,
     twist_to_msg,
     wrench_from_msg,
 )
+from pbrl_control.ros.floor_conversions import fixed_from_msg, odometry_from_msg, room_from_msg
 from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
+from pbrl_control.settings import ControllerSettings, load_section
 from pbrl_control.trajectories.course import TrajectoryCourse
 from pbrl_control.trajectories.trajectory_plan import load_trajectory
 from pbrl_model.errors import ModelError
@@ -56,29 +71,38 @@ class PushNode(Node):
         trajectory = declare(
             self, "trajectory", "", "in place of a plan: name of one in config/params/trajectories, or a path"
         )
+        fetch = declare(self, "fetch", False, "drive to the object first, from anywhere in the room")
+        grips = declare(self, "grips", "plan", "of a fetch: plan, as it says; sampled, as the object's model allows")
         self._exit = declare(self, "exit_when_done", False, "end with exit code 0 when done, 1 when failed")
         rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (10.0, 200.0))
         refuse_unknown(self)
+        if grips not in ("plan", "sampled") or (grips == "sampled" and not fetch):
+            raise ControlError(f"grips: expected plan, or sampled together with fetch:=true, got {grips!r}")
         self._course: TrajectoryCourse | None = None
-        if trajectory:
-            wanted = load_trajectory(trajectory)
-            self._course = TrajectoryCourse(wanted)
-            self._executive = PushExecutive(wanted, self._course)
-        else:
-            self._executive = PushExecutive(load_plan(plan))
+        self._plan, self._task = self._load(plan, trajectory)
+        self._hands = tuple(side for side in SIDES if any(grip.gripper == side for grip in self._plan.grips))
+        self._sampled = SampledGrasps(hands=(self._hands,)) if grips == "sampled" else None
+        self._fetch: FetchExecutive | None = None  # made when the robot's description comes
+        self._executive: Executive | None = None if fetch else PushExecutive(self._plan, self._task)
         self.ended: Future = Future()
+        self._posture: Posture | None = None
         self._tags: dict[str, Tag] = {}
+        self._tag_topics: set[str] = set()
         self._wrenches: dict[str, Array] = {}
         self._grips: dict[str, Grip] = {}
         self._bodies: dict[str, BodyShape] = {}
+        self._scene: Scene | None = None
         self._learned: ObjectModel | None = None
+        self._share = 1.0
         self._phase = ""
         self._subscribe()
+        if fetch:
+            self._subscribe_to_the_floor()
         self._status = self.create_publisher(String, "/push/status", LATCHED)
         self._twist = self.create_publisher(TwistStamped, "/object_twist_command", COMMANDS)
         self._expected = {
             side: self.create_publisher(WrenchStamped, f"/expected_grip_wrench/{side}", COMMANDS)
-            for side in (grip.gripper for grip in self._executive.plan.grips)
+            for side in self._hands
         }
         self._callers: dict[str, Client] = {
             "grasp": self.create_client(GraspObject, "/grasp"),
@@ -86,38 +110,100 @@ class PushNode(Node):
         }
         self.create_timer(1.0 / rate, self._tick)
 
+    def _load(self, plan: str, trajectory: str) -> tuple[GraspPlan, Course]:
+        """Return what to grasp, and what to do with it."""
+        if trajectory:
+            wanted = load_trajectory(trajectory)
+            self._course = TrajectoryCourse(wanted)
+            return wanted, self._course
+        push = load_plan(plan)
+        return push, SegmentCourse(push)
+
     def _subscribe(self) -> None:
-        plan = self._executive.plan
         self.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
         self.create_subscription(Grasps, "/grasps", self._on_grasps, LATCHED)
-        if self._course is not None:
+        self.create_subscription(Float64, "/body_controller/share", self._on_share, NEWEST)
+        if self._course is not None or self._sampled is not None:
             self.create_subscription(ObjectModels, "/object_models", self._on_models, LATCHED)
-        for side in (grip.gripper for grip in plan.grips):
+        for side in self._hands:
             self.create_subscription(WrenchStamped, f"/wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
-        for name in (plan.object, *(gripper_tag(grip.gripper) for grip in plan.grips)):
+        for name in (self._plan.object, *(gripper_tag(side) for side in self._hands)):
+            self._listen_to_tag(name)
+
+    def _subscribe_to_the_floor(self) -> None:
+        """Listen to what driving needs beyond that."""
+        self.create_subscription(String, "/robot_description", self._on_description, LATCHED)
+        self.create_subscription(JointState, "/joint_states", self._on_joints, NEWEST)
+        self.create_subscription(Odometry, "/odom", self._on_odometry, NEWEST)
+        for side in SIDES:
+            self._listen_to_tag(gripper_tag(side))
+
+    def _listen_to_tag(self, name: str) -> None:
+        if name not in self._tag_topics:
+            self._tag_topics.add(name)
             self.create_subscription(PoseStamped, f"/ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
 
+    def _on_description(self, message: String) -> None:
+        if self._fetch is not None:
+            return
+        settings = load_section(params_folder("settings") / "body_controller.yaml", ControllerSettings, "settings")
+        try:
+            kinematics = RobotKinematics(message.data)
+        except ControlError as error:
+            self.get_logger().error(str(error))
+            return
+        choice = self._sampled or GivenGrips(self._plan)
+        self._fetch = FetchExecutive(self._plan, kinematics, settings, choice=choice, course=self._task)
+        self._executive = self._fetch
+        self._tell_scene()
+
+    def _on_joints(self, message: JointState) -> None:
+        try:
+            self._posture = posture_from_msg(message)
+        except ControlError as error:
+            self.get_logger().error(str(error), once=True)
+
+    def _on_share(self, message: Float64) -> None:
+        self._share = message.data
+
+    def _on_odometry(self, message: Odometry) -> None:
+        if self._fetch is not None:
+            self._fetch.odometry(*odometry_from_msg(message))
+
     def _on_scene(self, message: Scene) -> None:
-        self._bodies = bodies_from_msg(message)
+        self._bodies, self._scene = bodies_from_msg(message), message
+        self._tell_scene()
         self._take_model()
 
+    def _tell_scene(self) -> None:
+        """Tell a fetch what wears no tag, and watch what does."""
+        if self._fetch is None or self._scene is None:
+            return
+        self._fetch.told(room_from_msg(self._scene), fixed_from_msg(self._scene))
+        for body in self._scene.bodies:
+            if body.movable:
+                self._listen_to_tag(body.name)
+
     def _on_models(self, message: ObjectModels) -> None:
-        own = [model for model in message.models if model.object == self._executive.plan.object]
+        own = [model for model in message.models if model.object == self._plan.object]
         self._learned = own[-1] if own else self._learned
         self._take_model()
 
     def _take_model(self) -> None:
         """Act on what was learned of the object, once its outline is known too."""
-        name = self._executive.plan.object
+        name = self._plan.object
         shape, learned = self._bodies.get(name), self._learned
-        if self._course is None or shape is None or learned is None:
+        if shape is None or learned is None:
             return
         try:
             belief = ClassBelief.of(posterior_from_msg(learned), shape.footprint)
+            if self._sampled is not None:
+                self._sampled.model = grasp_model(Freedom.of(belief.model))
         except (ControlError, ModelError) as error:
             self.get_logger().error(f"model of {name!r} is left aside: {error}")
             return
-        self._course.model = belief.model
+        if self._course is not None:
+            self._course.model = belief.model
         share = belief.probabilities[belief.model_class]
         self.get_logger().info(f"{name} is taken as {belief.model_class} ({100 * share:.0f} % of the draws)")
 
@@ -131,13 +217,16 @@ class PushNode(Node):
         self._tags[name] = tag_from_msg(message)
 
     def _tick(self) -> None:
+        if self._executive is None:
+            self.get_logger().info("waiting for /robot_description", once=True)
+            return
         now = self.get_clock().now()
-        percept = Percept(None, self._tags, self._wrenches, self._grips, self._bodies)
+        percept = Percept(self._posture, self._tags, self._wrenches, self._grips, self._bodies, self._share)
         command = self._executive.tick(now.nanoseconds * 1e-9, percept)
         for target, twist in command.twists.items():
             self._twist.publish(twist_to_msg(target, twist, now.to_msg()))
         for side, wrench in command.expected.items():
-            message = expected_to_msg(self._executive.plan.object, wrench, now.to_msg())
+            message = expected_to_msg(self._plan.object, wrench, now.to_msg())
             self._expected[side].publish(message)
         for request in command.requests:
             self._ask(request)
@@ -160,7 +249,7 @@ class PushNode(Node):
         client = self._callers[request.action]
         if not client.service_is_ready():
             sentence = f"no service {client.srv_name}; is the simulator or robot running?"
-            self._executive.answer(GripperAnswer(request.action, request.side, False, sentence))
+            self._answer(GripperAnswer(request.action, request.side, False, sentence))
             return
         if request.action == "grasp":
             call = client.call_async(GraspObject.Request(gripper=request.side, object=request.object))
@@ -172,11 +261,15 @@ class PushNode(Node):
         result = call.result()
         if result is None:
             sentence = f"the {request.action} service gave no result"
-            self._executive.answer(GripperAnswer(request.action, request.side, False, sentence))
+            self._answer(GripperAnswer(request.action, request.side, False, sentence))
             return
         distance = float(getattr(result, "distance", 0.0))
         answer = GripperAnswer(request.action, request.side, bool(result.success), str(result.message), distance)
-        self._executive.answer(answer)
+        self._answer(answer)
+
+    def _answer(self, answer: GripperAnswer) -> None:
+        if self._executive is not None:
+            self._executive.answer(answer)
 
 
 def main() -> None:
