@@ -20,7 +20,7 @@ from krang_sim.session import KrangSession
 from pbrl_control.course import Course
 from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
-from pbrl_control.loop import ControlLoop, LoopCommand
+from pbrl_control.loop import ControlLoop, Executive, LoopCommand
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag
 from pbrl_control.push import GripperAnswer, GripperRequest, PushCommand
 from pbrl_control.settings import ControllerSettings
@@ -31,22 +31,28 @@ class Manipulation:
 
     Args:
         session: of the simulator.
-        plan: what to grasp, and how.
+        task: an executive, or what to grasp, and how.
         settings: of the body controller.
-        course: what the object does while it is held; None: the segments of a push plan.
+        course: what the object of a plan does while it is held; None: the segments of a push plan.
 
     Attributes:
+        plan: what is grasped, and how.
         last: the executive's last command; None before the first.
         loop: once the robot's description has come.
     """
 
     def __init__(
-        self, session: KrangSession, plan: GraspPlan, settings: ControllerSettings, course: Course | None = None
+        self,
+        session: KrangSession,
+        task: GraspPlan | Executive,
+        settings: ControllerSettings,
+        course: Course | None = None,
     ) -> None:
         self.session = session
-        self.plan = plan
+        self.plan = task if isinstance(task, GraspPlan) else task.plan
         self.last: PushCommand | None = None
         self.loop: ControlLoop | None = None
+        self._task = task
         self._settings = settings
         self._course = course
         self._posture: Posture | None = None
@@ -106,7 +112,7 @@ class Manipulation:
 
     @perceive.register
     def _(self, observation: RobotDescription) -> None:
-        self.loop = ControlLoop(RobotKinematics(observation.urdf), self.plan, self._settings, self._course)
+        self.loop = ControlLoop(RobotKinematics(observation.urdf), self._task, self._settings, self._course)
 
     @perceive.register
     def _(self, observation: JointStates) -> None:

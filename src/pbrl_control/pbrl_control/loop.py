@@ -33,6 +33,7 @@ class LoopCommand:
 class Executive(Protocol):
     """Decides what the robot does: `PushExecutive`, `FetchExecutive`."""
 
+    plan: GraspPlan
     phase: Phase
 
     def tick(self, now: float, percept: Percept) -> PushCommand:

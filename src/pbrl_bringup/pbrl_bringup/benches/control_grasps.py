@@ -22,11 +22,11 @@ from krang_sim.robot import description_path
 from krang_sim.session import KrangSession
 from pbrl_bringup.manipulation import Manipulation
 from pbrl_bringup.paths import config_file
-from pbrl_control.fetching import ConfirmedCourse, FetchExecutive, FetchSettings, GripTestSettings, SampledGrasps
+from pbrl_control.fetching import FetchExecutive, FetchSettings, SampledGrasps
 from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.grasping.contacts import Hands
 from pbrl_control.kinematics import SIDES, RobotKinematics
-from pbrl_control.loop import ControlLoop, LoopCommand
+from pbrl_control.loop import LoopCommand
 from pbrl_control.navigation import KRANG_STOWED, reaching_arms
 from pbrl_control.percept import Grip, Percept, Tag, gripper_tag
 from pbrl_control.push import GripperAnswer, Phase
@@ -208,13 +208,12 @@ class _Fetching(Manipulation):
         settings = load_section(config_file("params", "body_controller"), ControllerSettings, "settings")
         grips = tuple({"gripper": side, "point": (0.0, 0.0)} for side in hands)
         plan = GraspPlan.model_validate({"name": "fetch", "object": TABLE, "grips": grips})
-        super().__init__(session, plan, settings, ConfirmedCourse(TABLE, GripTestSettings()))
         kinematics = RobotKinematics(description_path().read_text(encoding="utf-8"))
         choice = SampledGrasps(hands=(hands,))
         own = FetchSettings(attempts=1) if fault else FetchSettings()  # what is broken stays broken
         self.fetch = FetchExecutive(plan, kinematics, settings, own, choice=choice, seed=seed)
+        super().__init__(session, self.fetch, settings)
         self.held: tuple[str, ...] = ()
-        self._own = ControlLoop(kinematics, self.fetch, settings)
         self._fault = fault
         self._truly: tuple[str, ...] = ()
         self._frozen: dict[str, Tag] = {}
@@ -226,7 +225,6 @@ class _Fetching(Manipulation):
         if isinstance(observation, KnownScene):
             fixed = {body.name: body.pose for body in observation.bodies if not body.movable}
             self.fetch.told(observation.room, fixed)
-            self.loop = self._own
         elif isinstance(observation, Odometry):
             if not (self._fault == "odometry lost on the way" and self.phase == Phase.DRIVE):
                 self.fetch.odometry(observation.time, observation.pose)

@@ -20,7 +20,7 @@ BENCHES = {
     "calibration": "ranks of the truth among posterior draws, over the prior",
     "concealed": "recordings with one thing concealed: is it noticed, named, and does the repair predict",
     "tags": "tags found in rendered pictures of six cameras, and the model of their noise, against the truth",
-    "control": "the body controller: Jacobians, limits, tick, steering; object paths in Bullet",
+    "control": "the body controller: Jacobians, limits, tick, jitter, steering; object paths and grasps in Bullet",
     "next-experiment": "pushes until it is known what was left out, chosen by information or at random",
     "mismatch": "the watch over a stream: half an hour of clean pushing without an alarm, and how late alarms are",
 }
