@@ -237,14 +237,19 @@ def test_a_trajectory_is_followed_as_the_learned_model_allows(spin_with, push_po
     scene = world.create_publisher(Scene, "/scene", LATCHED)
     names = {"mass": 33.0, "wheel_x": -0.3, "wheel_y": -0.6, "wheel_theta": 0.0, "mu_x": 0.9, "mu_y": 0.9}
     learned = ObjectModel(object="table_a", model_class="wheel", parameters=list(names), draws=1)
-    learned.units, learned.samples = [UNITS[name] for name in names], list(names.values())
+    learned.units, learned.samples = [UNITS[name] for name in names], [-1.0, *list(names.values())[1:]]
     models.publish(ObjectModels(models=[learned]))
     until(lambda: node._learned is not None, lambda turn: world.tell(0.02 * turn, push_posture))
     assert node._course.model is None, "its outline is not known yet"
     corners = [Point(x=x, y=y) for x, y in ((-0.4, -0.7), (0.4, -0.7), (0.4, 0.7), (-0.4, 0.7))]
     scene.publish(Scene(bodies=[Body(name="table_a", footprint=corners, height=0.77)]))
+    until(lambda: node._course.refused, lambda turn: world.tell(5.0 + 0.02 * turn, push_posture))
+    assert "expected a mass above zero" in node._course.refused
+    learned.samples = list(names.values())
+    models.publish(ObjectModels(models=[learned]))
     until(lambda: node._course.model is not None, lambda turn: world.tell(10.0 + 0.02 * turn, push_posture))
     assert node._course.model.mass == 33.0
+    assert not node._course.refused, "a sound model takes its place"
     learned.samples = [-1.0, *learned.samples[1:]]
     models.publish(ObjectModels(models=[learned]))
     until(lambda: node._learned.samples[0] == -1.0, lambda turn: world.tell(20.0 + 0.02 * turn, push_posture))

@@ -50,6 +50,14 @@ def test_without_a_tag_it_waits_at_rest() -> None:
     assert not step.twist.moves()
 
 
+def test_with_a_model_that_is_none_it_does_not_set_out() -> None:
+    course = TrajectoryCourse(PLAN)
+    course.refused = "model of 'table': expected a mass above zero"
+    with pytest.raises(ControlError, match="expected a mass above zero"):
+        course.step(0.0, 0.01, seen(0.0, START), HOLD, CALM)
+    assert course.follower is None
+
+
 def test_with_a_model_it_says_what_the_grips_have_to_apply() -> None:
     model = ObjectModel.uniform(BodyParameters(mass=30.0, mu_ground=0.05), TABLE)
     course = TrajectoryCourse(PLAN, model)

@@ -201,9 +201,11 @@ class PushNode(Node):
                 self._sampled.model = grasp_model(Freedom.of(belief.model))
         except (ControlError, ModelError) as error:
             self.get_logger().error(f"model of {name!r} is left aside: {error}")
+            if self._course is not None and self._course.model is None:
+                self._course.refused = f"model of {name!r}: {error}"
             return
         if self._course is not None:
-            self._course.model = belief.model
+            self._course.model, self._course.refused = belief.model, ""
         share = belief.probabilities[belief.model_class]
         self.get_logger().info(f"{name} is taken as {belief.model_class} ({100 * share:.0f} % of the draws)")
 

@@ -22,12 +22,14 @@ class TrajectoryCourse:
 
     Attributes:
         model: as last learned; what it is when the object sets out counts.
+        refused: why what was learned is no model, where there is no other; empty: it was not. Then nothing sets out.
         follower: once it has set out.
     """
 
     def __init__(self, plan: TrajectoryPlan, model: ObjectModel | None = None) -> None:
         self.follower: TrajectoryFollower | None = None
         self.model = model
+        self.refused = ""
         self._plan = plan
 
     def step(self, now: float, dt: float, percept: Percept, hold: Hold, forces: Mapping[str, float]) -> CourseStep:
@@ -36,6 +38,8 @@ class TrajectoryCourse:
         if self.follower is None:
             if tag is None:
                 return CourseStep(PlanarTwist(), "waiting for a tag of the object")
+            if self.refused:
+                raise ControlError(self.refused)
             self.follower = self._set_out(percept)
         command = self.follower.tick(now, tag, forces, percept.share)
         if command.state == FollowState.ABORTED:
