@@ -1,13 +1,13 @@
-"""Forward kinematics and Jacobians of the two-armed robot, in the frame `base`.
+"""Forward kinematics and Jacobians of the two-armed robot, in the frame `base`, with Pinocchio.
 
-Pinocchio reads the description and places any frame of it; what a tick needs of the grippers is compiled. The wheels
-are locked out of the model: `base` is where odometry moves it, everything here is relative to it.
+The wheels are locked out of the model: `base` is where odometry moves it, everything here is relative to it.
 A gripper's *planar axes* are x along its approach direction (out of the wrist, between the plates), y to
 the left and z up; they are the same for both grippers, whose `<side>_ft` frames are mirror images.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +16,6 @@ import numpy as np
 import pinocchio as pin
 
 from pbrl_control.errors import ControlError
-from pbrl_control.kinematics_kernel import place_grippers
 from pbrl_control.planar import Array
 
 SIDES = ("left", "right")
@@ -118,9 +117,6 @@ class RobotKinematics:
         self._columns = {side: [self._joint(name).idx_v for name in ARM_JOINTS[side]] for side in SIDES}
         order = (*BODY_JOINTS, *ARM_JOINTS["left"], *ARM_JOINTS["right"])
         self._order = np.array([self._joint(name).idx_q for name in order])
-        chains = [self._chain(side, order) for side in SIDES]
-        self._origins, self._mounts, self._axes, self._turns = (np.array(each) for each in zip(*chains, strict=True))
-        self._approach = np.array([APPROACH[side] for side in SIDES])
 
     @classmethod
     def from_file(cls, path: Path) -> RobotKinematics:
@@ -154,51 +150,21 @@ class RobotKinematics:
 
     def grippers(self, posture: Posture) -> Mapping[str, GripperState]:
         """Return both grippers' states, one pass of kinematics for both."""
-        positions, rotations = np.empty((2, 3)), np.empty((2, 3, 3))
-        places, jacobians = np.empty((2, 4)), np.empty((2, 6, 7))
-        place_grippers(
-            self._origins,
-            self._mounts,
-            self._axes,
-            self._turns,
-            self._approach,
-            GRIP,
-            posture.vector(),
-            positions,
-            rotations,
-            places,
-            jacobians,
-        )
-        return {
-            side: GripperState(FramePose(positions[k], rotations[k]), places[k, :3], float(places[k, 3]), jacobians[k])
-            for k, side in enumerate(SIDES)
-        }
+        pin.computeJointJacobians(self._model, self._data, self._configuration(posture))
+        return {side: self._gripper(side) for side in SIDES}
 
-    def _chain(self, side: str, order: Sequence[str]) -> tuple[list[Array], list[Array], list[Array], list[int]]:
-        """Return what `place_grippers` takes of one side: origins, mounts, axes, places of the joints in `order`."""
-        model = self._model
-        frame = model.frames[self._frames[f"{side}_ft"]]
-        joint, joints = int(frame.parentJoint), list[int]()
-        while joint:
-            joints.insert(0, joint)
-            joint = int(model.parents[joint])
-        names = [model.names[joint] for joint in joints]
-        if names != [*BODY_JOINTS, *ARM_JOINTS[side]]:
-            wanted = ", ".join((*BODY_JOINTS, *ARM_JOINTS[side]))
-            raise ControlError(f"robot description: expected {side}_ft at the end of {wanted}; got {', '.join(names)}")
-        placements = [*(model.jointPlacements[joint] for joint in joints), frame.placement]
-        origins = [np.array(placement.translation) for placement in placements]
-        mounts = [np.array(placement.rotation) for placement in placements]
-        return origins, mounts, [self._axis(joint) for joint in joints], [order.index(name) for name in names]
-
-    def _axis(self, joint: int) -> Array:
-        """Return the unit vector (3,) that a joint turns about, in its own frame."""
-        model, data = self._model, self._model.createData()
-        pin.computeJointJacobians(model, data, pin.neutral(model))
-        motion = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)[:, model.joints[joint].idx_v]
-        if motion[:3].any():
-            raise ControlError(f"robot description: expected joint {model.names[joint]!r} to turn, got one that slides")
-        return np.array(motion[3:])
+    def _gripper(self, side: str) -> GripperState:
+        index = self._frames[f"{side}_ft"]
+        placement = pin.updateFramePlacement(self._model, self._data, index)
+        pose = FramePose(np.array(placement.translation), np.array(placement.rotation))
+        whole = pin.getFrameJacobian(self._model, self._data, index, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        jacobian = np.array(whole[:, self._columns[side]])
+        approach = pose.rotation @ APPROACH[side]
+        lever = GRIP * approach
+        jacobian[:3] -= pin.skew(lever) @ jacobian[3:]
+        middle = pose.position + lever
+        planar = np.array([middle[0], middle[1], math.atan2(approach[1], approach[0])])
+        return GripperState(pose, planar, float(middle[2]), jacobian)
 
     def _configuration(self, posture: Posture) -> Array:
         q = np.empty(self._model.nq)
