@@ -112,8 +112,9 @@ class RobotKinematics:
         except (ValueError, RuntimeError) as error:
             raise ControlError(f"robot description: expected URDF text, got {urdf[:40]!r}: {error}") from error
         self._model = _without_wheels(whole)
-        self._data = self._model.createData()
         self._frames = {name: self._frame(name) for name in ("left_ft", "right_ft")}
+        self._plates = {side: self._add_plates(side) for side in SIDES}
+        self._data = self._model.createData()
         self._columns = {side: [self._joint(name).idx_v for name in ARM_JOINTS[side]] for side in SIDES}
         order = (*BODY_JOINTS, *ARM_JOINTS["left"], *ARM_JOINTS["right"])
         self._order = np.array([self._joint(name).idx_q for name in order])
@@ -154,17 +155,21 @@ class RobotKinematics:
         return {side: self._gripper(side) for side in SIDES}
 
     def _gripper(self, side: str) -> GripperState:
-        index = self._frames[f"{side}_ft"]
-        placement = pin.updateFramePlacement(self._model, self._data, index)
-        pose = FramePose(np.array(placement.translation), np.array(placement.rotation))
+        sensor = pin.updateFramePlacement(self._model, self._data, self._frames[f"{side}_ft"])
+        pose = FramePose(np.array(sensor.translation), np.array(sensor.rotation))
+        index = self._plates[side]
+        middle = pin.updateFramePlacement(self._model, self._data, index).translation
         whole = pin.getFrameJacobian(self._model, self._data, index, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        jacobian = np.array(whole[:, self._columns[side]])
         approach = pose.rotation @ APPROACH[side]
-        lever = GRIP * approach
-        jacobian[:3] -= pin.skew(lever) @ jacobian[3:]
-        middle = pose.position + lever
         planar = np.array([middle[0], middle[1], math.atan2(approach[1], approach[0])])
-        return GripperState(pose, planar, float(middle[2]), jacobian)
+        return GripperState(pose, planar, float(middle[2]), whole[:, self._columns[side]])
+
+    def _add_plates(self, side: str) -> int:
+        """Add the middle of a gripper's plates to the frames; return its number."""
+        sensor = self._model.frames[self._frames[f"{side}_ft"]]
+        placement = sensor.placement * pin.SE3(np.eye(3), GRIP * np.asarray(APPROACH[side]))
+        plates = pin.Frame(f"{side}_plates_middle", sensor.parentJoint, placement, pin.FrameType.OP_FRAME)
+        return int(self._model.addFrame(plates))
 
     def _configuration(self, posture: Posture) -> Array:
         q = np.empty(self._model.nq)
