@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from pbrl_bringup.ros.moments import Moments, MomentsClient
 
 RATE = 200.0
 """[Hz]"""
+PRIORITY = 50
+"""Real-time priority of the controller, where it may have one; that of ros2_control."""
 JITTER = 2.0
 """p99 of how far an interval between commands is from the period [ms]."""
 SLACK = 0.99
@@ -42,7 +45,12 @@ def jitter_rows(seed: int, out: Path) -> list[Row]:
     sent, came = (np.array(each) for each in (moments.sent, moments.came))
     rate = (len(sent) - 1) / (sent[-1] - sent[0])
     off, late = (1e3 * np.abs(np.diff(each) - 1.0 / RATE) for each in (sent, came))
-    beside = {"median": np.median(off), "worst": off.max(), "p99 as they came": np.percentile(late, 99.0)}
+    beside = {
+        "priority": priority(),
+        "median": np.median(off),
+        "worst": off.max(),
+        "p99 as they came": np.percentile(late, 99.0),
+    }
     what = "their jitter: p99 of |interval - 5 ms| as they were sent"
     return [
         at_least(
@@ -79,4 +87,9 @@ def two_arms(seed: int) -> Graph:
     whole = load_graph("krang_push")
     graph = whole.model_copy(update={"nodes": {name: whole.nodes[name] for name in ("sim", "controller", "push")}})
     settings = {"sim.scene": "free_table", "sim.seed": str(seed), "push.trajectory": "straight_and_turn"}
-    return with_parameters(graph, {**settings, "controller.rate": str(RATE)})
+    return with_parameters(graph, {**settings, "controller.rate": str(RATE), "controller.priority": str(priority())})
+
+
+def priority() -> int:
+    """Return the controller's priority: none where this user may not give one."""
+    return PRIORITY if os.geteuid() == 0 or resource.getrlimit(resource.RLIMIT_RTPRIO)[0] >= PRIORITY else 0

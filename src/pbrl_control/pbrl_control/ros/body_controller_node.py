@@ -1,10 +1,11 @@
 """Node around `BodyController`: /object_twist_command in, /cmd_vel and arm velocities out.
 
 It ticks with every /joint_states message, so at that topic's rate and on its clock, simulated or not; or, with `rate`,
-so many times a second of the wall clock with the newest one, for a robot or a simulator that runs in real time. When
-joint states cease nothing is sent any more, and base and arms stop by their own watchdogs. While /emergency_stop
-(std_msgs/Bool) is true the robot rests, whatever is commanded; /body_controller/status says why it rests, and
-/body_controller/share with every command, how much of the asked twist is done by it.
+so many times a second of the wall clock with the newest one, for a robot or a simulator that runs in real time; with
+`priority` before everything else that the machine does. When joint states cease nothing is sent any more, and base and
+arms stop by their own watchdogs. While /emergency_stop (std_msgs/Bool) is true the robot rests, whatever is commanded;
+/body_controller/status says why it rests, and /body_controller/share with every command, how much of the asked twist is
+done by it.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
 from pbrl_control.limits import LONGEST
 from pbrl_control.percept import Grip, Percept, Tag, gripper_tag, holds_of
 from pbrl_control.planar import Array
+from pbrl_control.realtime import take_priority
 from pbrl_control.ros.conversions import (
     arm_to_msg,
     base_to_msg,
@@ -68,6 +70,8 @@ class BodyControllerNode(Node):
         path = declare(self, "settings", "", "YAML of gains and limits; empty: body_controller.yaml as installed")
         rate = "ticks a second of the wall clock [Hz]; 0: with every /joint_states"
         self._rate: float = declare(self, "rate", 0.0, rate, (0.0, 1000.0))
+        first = "real-time priority (SCHED_FIFO), 1 to 99, beside a rate; 0: none"
+        self.priority: int = declare(self, "priority", 0, first, (0, 99))
         refuse_unknown(self)
         file = Path(path) if path else params_folder("settings") / "body_controller.yaml"
         self._settings = load_section(file, ControllerSettings, "settings")
@@ -230,7 +234,7 @@ def _tag_stream(name: str) -> str:
     return f"tag {name!r}"
 
 
-def _spin(node: Node, stop: threading.Event) -> None:
+def _spin(node: BodyControllerNode, stop: threading.Event) -> None:
     """Handle what comes, in the order in which it comes, until `stop` is set.
 
     rclpy's usual executor lays a new set of everything to wait for whenever it has handled what was there: that is half
@@ -240,6 +244,7 @@ def _spin(node: Node, stop: threading.Event) -> None:
     gc.freeze()  # what there is by now stays: looking through it again would hold up a tick
     executor = EventsExecutor()
     executor.add_node(node)
+    take_priority(node.priority)
     try:
         while rclpy.ok() and not stop.is_set():
             executor.spin_once(timeout_sec=WAIT)
