@@ -124,4 +124,5 @@ class WholeBodyProgram:
         found, _, flag, _ = daqp.solve(self._hessian, self._linear, self._rows, self._most, self._least, self._sense)
         if flag not in SOLVED:
             return None
-        return Solution(found[:16], float(found[16] / reach) if reach > 0.0 else 1.0)
+        # The solver keeps its bounds to within 1e-5.
+        return Solution(found[:16], min(max(float(found[16] / reach), 0.0), 1.0) if reach > 0.0 else 1.0)
