@@ -254,6 +254,10 @@ def test_a_trajectory_is_followed_as_the_learned_model_allows(spin_with, push_po
     models.publish(ObjectModels(models=[learned]))
     until(lambda: node._learned.samples[0] == -1.0, lambda turn: world.tell(20.0 + 0.02 * turn, push_posture))
     assert node._course.model.mass == 33.0, "what has no mass is left aside"
+    learned.samples = [-1.0, *learned.samples[1:]]
+    models.publish(ObjectModels(models=[learned]))
+    until(lambda: node._learned.samples[0] == -1.0, lambda turn: world.tell(20.0 + 0.02 * turn, push_posture))
+    assert node._course.model.mass == 33.0, "what has no mass is left aside"
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ class ProgramSettings(Section):
     share: Positive = 2e-3  # of doing all of the asked twist now, against a speed error as long as the twist itself
     base_forward: Positive = 4e-4  # of the base's speed beside the steering's
     base_yaw: Positive = 2e-4  # [m^2/rad^2] of its yaw rate
-    joints: Positive = 5e-7  # [m^2/rad^2] of rates of an arm that works, beside the draw to its posture
+    joints: Positive = 2e-7  # [m^2/rad^2] of rates of an arm that works, beside the draw to its posture
     idle_joints: Positive = 1e-2  # [m^2/rad^2] of one that does not
     angular_length: Positive = 0.5  # [m] at which an angular speed of a gripper counts as a linear one
     border_rate: Positive = 2.0  # [1/s] speed towards a border of the workspace is at most this times the way left
