@@ -1,0 +1,18 @@
+from setuptools import find_packages, setup
+
+NAME = "pbrl_planner"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Planners of motions on learned physics: kinodynamic RRT of what a robot pushes.",
+    license="BSD-3-Clause",
+    packages=find_packages(),
+    package_data={NAME: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+    ],
+    install_requires=["numba", "numpy", "ompl", "pydantic", "shapely"],
+    zip_safe=False,
+)
