@@ -13,7 +13,18 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["daqp", "numba", "numpy", "ompl", "pin", "pydantic", "pyyaml", "scipy", "shapely"],
+    install_requires=[
+        "daqp",
+        "numba",
+        "numpy",
+        "ompl",
+        "opencv-python-headless",
+        "pin",
+        "pydantic",
+        "pyyaml",
+        "scipy",
+        "shapely",
+    ],
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -302,7 +302,7 @@ def _with_paths(
         if dead_ends >= settings.dead_ends:
             rejected.append(Rejection(sides, stand.point, f"way: not looked for after {dead_ends} dead ends"))
             continue
-        route = plan_route(checker, base, stand.goal, seed=seed, time_limit=settings.time_limit)
+        route = plan_route(checker, base, stand.goal, seed=seed, time_limit=settings.time_limit, narrow=settings.narrow)
         if route.path is None:
             dead_ends += route.exhausted
             rejected.append(Rejection(sides, stand.point, f"way: {route.reason}"))

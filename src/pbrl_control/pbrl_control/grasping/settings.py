@@ -27,3 +27,4 @@ class GraspSettings(Section):
     edge_thickness: Positive = 0.025  # [m] of the object's edge: a table top
     clearance: NotNegative = 0.03  # [m] around the robot at the grasp and on the way there
     time_limit: Positive = 5.0  # [s] for each path
+    narrow: bool = False  # the room is full: paths are sought on a grid first, see `plan_route`

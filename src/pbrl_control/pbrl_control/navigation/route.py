@@ -21,6 +21,7 @@ from ompl import geometric as og
 from ompl import util as ou
 
 from pbrl_control.errors import ControlError
+from pbrl_control.navigation.grid_route import grid_path
 from pbrl_control.navigation.motion import MotionChecker
 from pbrl_control.navigation.path import BasePath, Leg
 from pbrl_control.planar import Array, wrap
@@ -49,7 +50,9 @@ class RouteResult:
     exhausted: bool = False
 
 
-def plan_route(checker: MotionChecker, start: Array, goal: Array, *, seed: int, time_limit: float = 5.0) -> RouteResult:
+def plan_route(
+    checker: MotionChecker, start: Array, goal: Array, *, seed: int, time_limit: float = 5.0, narrow: bool = False
+) -> RouteResult:
     """Find a short path of the base between two poses (3,) in `world` [m, rad].
 
     The start needs only to be free of collision; everything else keeps the checker's margin.
@@ -59,7 +62,9 @@ def plan_route(checker: MotionChecker, start: Array, goal: Array, *, seed: int, 
         start: where the base is.
         goal: where it is to be, reached exactly.
         seed: of OMPL's generator, positive. The same seed gives the same path, unless the time limit is hit.
-        time_limit: [s].
+        time_limit: [s] of the sampling.
+        narrow: the room is full: look at every place and heading of a grid first (see `grid_path`), and only then
+            at samples; otherwise only where samples find none.
 
     Raises:
         ControlError: the seed or the time limit is not positive.
@@ -73,6 +78,19 @@ def plan_route(checker: MotionChecker, start: Array, goal: Array, *, seed: int, 
     direct = _direct(checker, start, goal)
     if direct is not None:
         return RouteResult(direct)
+    if narrow:
+        way = grid_path(checker, start, goal)
+        if way is not None:
+            return RouteResult(way)
+    sampled = _sampled(checker, start, goal, seed, time_limit)
+    if sampled.path is None and sampled.exhausted and not narrow:
+        way = grid_path(checker, start, goal)
+        return sampled if way is None else RouteResult(way)
+    return sampled
+
+
+def _sampled(checker: MotionChecker, start: Array, goal: Array, seed: int, time_limit: float) -> RouteResult:
+    """Return a path whose corners are sampled where the robot can turn all the way round."""
     out, back = _stage(checker.bare(), checker, start), _stage(checker, checker, goal)
     for name, stage in (("start", out), ("goal", back)):
         if stage is None:
