@@ -1,0 +1,157 @@
+"""Which part does the work of which state, made when the state is entered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from pbrl_control.kinematics import RobotKinematics
+from pbrl_control.percept import Percept
+from pbrl_control.planar import Array
+from pbrl_control.push import Phase
+from pbrl_control.settings import ControllerSettings
+from pbrl_namo.errors import NamoError
+from pbrl_namo.executive.asking import Asking
+from pbrl_namo.executive.driving import DriveToGoal
+from pbrl_namo.executive.jobs import Answer, Job
+from pbrl_namo.executive.manipulating import Manipulation
+from pbrl_namo.executive.mission import Mission
+from pbrl_namo.executive.readying import GetReady
+from pbrl_namo.executive.releasing import Release
+from pbrl_namo.executive.settings import ExecutiveSettings
+from pbrl_namo.executive.step import BasePart, Part, Resting, Step, still_held
+from pbrl_namo.executive.table import MAY_HOLD, RELEASING, Event, State
+from pbrl_namo.executive.thinker import Question, Thinker
+from pbrl_namo.executive.view import Look, RoomView
+from pbrl_namo.scene import NamoScene
+
+OpeningCheck = Callable[[NamoScene, Array], bool]
+"""Says whether the robot can get from where it is in a scene to most of the points (k, 2) of a region, in `world`."""
+
+
+class Parts:
+    """Makes them.
+
+    Args:
+        view: of robot and room.
+        kinematics: of the robot.
+        thinker: who is asked.
+        opening: says whether there is an opening; None: nobody can tell.
+        controller: settings of the body controller that obeys.
+        settings: of everything else.
+        gone: who is waited for, in words; empty: nobody.
+    """
+
+    def __init__(
+        self,
+        view: RoomView,
+        kinematics: RobotKinematics,
+        thinker: Thinker,
+        opening: OpeningCheck | None,
+        controller: ControllerSettings,
+        settings: ExecutiveSettings,
+        gone: Callable[[], str],
+    ) -> None:
+        self._view, self._kinematics, self._thinker, self._opening = view, kinematics, thinker, opening
+        self._controller, self._settings, self._gone = controller, settings, gone
+
+    def make(self, state: State, now: float, mission: Mission, reason: str) -> Part:
+        """Return what does the work of a state that is entered at `now` [s].
+
+        Raises:
+            ControlError: it cannot be begun, and why.
+            NamoError: likewise.
+        """
+        view, settings = self._view, self._settings
+        if state == State.LOOK:
+            return Look(view, settings)
+        if state == State.GET_READY:
+            return GetReady(view, self._controller, settings)
+        if state == State.NAVIGATE:
+            mission.manipulation = self._manipulation(mission)
+        if state in (State.NAVIGATE, State.GRASP, State.CLEAR):
+            assert mission.manipulation is not None
+            return mission.manipulation.part(state)
+        if state in RELEASING:
+            held = mission.manipulation
+            return Release(settings.release, () if held is None else held.candidate.sides)
+        if state == State.DRIVE_TO_GOAL:
+            assert mission.planned.way is not None
+            return DriveToGoal(mission.planned.way, view, self._controller.base, settings)
+        if state == State.PAUSED:
+            return Paused(self._gone, settings.pause_timeout)
+        if state in (State.DONE, State.FAILED, State.CANCELLED):
+            return Resting(reason or "done", Phase.DONE if state == State.DONE else Phase.FAILED)
+        return self._ask(state, now, mission)
+
+    def _ask(self, state: State, now: float, mission: Mission) -> Part:
+        view, jobs = self._view, self._settings.jobs
+        job: Job
+        take: Callable[[Answer], Step]
+        if state == State.PLANNING:
+            job, take, what, timeout = mission.plan_job(now, view), mission.take_plan, "a plan", jobs.plan
+        elif state == State.GET_GRASP_POINT:
+            job, take, what, timeout = mission.grasp_job(now, view), mission.take_grasp, "a grasp", jobs.grasp
+        elif state == State.UPDATE_MODEL:
+            job, take, what, timeout = mission.learn_job(), mission.take_learned, "a learned model", jobs.learn
+        else:
+            job, take, what, timeout = mission.mismatch_job(), mission.take_mismatch, "a diagnosis", jobs.mismatch
+        phase = Phase.SETTLE if state in MAY_HOLD else Phase.LOCATE
+        return Asking(Question(self._thinker, job, timeout, self._settings.jobs), take, what, phase)
+
+    def _manipulation(self, mission: Mission) -> Manipulation:
+        move, candidate, check = mission.planned.move, mission.grasp.candidate, self._opening
+        assert move is not None and candidate is not None
+        targets = np.asarray(move.targets, dtype=float).reshape(-1, 2)
+
+        def opened(_: float, percept: Percept) -> bool:
+            scene = self._view.held_scene(percept, move.object, mission.goal)
+            return check is not None and scene is not None and check(_without(scene, move.then), targets)
+
+        return Manipulation(
+            move,
+            candidate,
+            self._view,
+            self._kinematics,
+            self._controller,
+            self._settings,
+            None if check is None else opened,
+        )
+
+
+class Paused(BasePart):
+    """Rests until whoever is gone is back.
+
+    Args:
+        gone: who is waited for, in words; empty: nobody any more.
+        timeout: [s] at most.
+    """
+
+    def __init__(self, gone: Callable[[], str], timeout: float) -> None:
+        self._gone, self._timeout = gone, timeout
+        self._since: float | None = None
+
+    def step(self, now: float, percept: Percept) -> Step:
+        """See `Part.step`."""
+        self._since = now if self._since is None or now < self._since else self._since
+        held, gone = still_held(percept), self._gone()
+        if not gone:
+            return Step(held, Event.STILL_HELD) if held else Step("whoever was gone is back", Event.LINK_BACK)
+        if now - self._since > self._timeout:
+            return Step(f"{gone}, for more than {self._timeout:.0f} s", Event.PAUSED_TOO_LONG)
+        return Step(f"waiting: {gone}", None, Phase.SETTLE if held else Phase.LOCATE)
+
+
+def _without(scene: NamoScene, names: tuple[str, ...]) -> NamoScene:
+    """Return a scene without some movable things: they will have to go too, but later.
+
+    Raises:
+        NamoError: there is no thing of a name.
+    """
+    for name in names:
+        if name not in scene.movable:
+            raise NamoError(f"plan: expected things that are in the scene, got {name!r}")
+    left = {name: thing for name, thing in scene.movable.items() if name not in names}
+    return replace(scene, movable=left, poses={name: scene.poses[name] for name in left})

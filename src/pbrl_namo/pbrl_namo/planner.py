@@ -1,0 +1,230 @@
+"""The NAMO planner: which thing to move next, how, and what to expect; or, in words, why nothing can be done.
+
+Free-space regions and openings are the upper level's states and actions; Monte-Carlo manipulation estimates each
+opening that matters; value iteration chooses (thesis 6.2.1). One plan is for what is known now: after each
+manipulation, and whenever a belief changes, everything is planned anew.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Self, TypeVar
+
+import numpy as np
+from pydantic import model_validator
+
+from pbrl_control.planar import Array
+from pbrl_control.settings import Section
+from pbrl_namo.beliefs.belief import ObjectBelief, prior_belief
+from pbrl_namo.beliefs.settings import BeliefSettings
+from pbrl_namo.errors import NamoError
+from pbrl_namo.manipulation.cost import best_reward
+from pbrl_namo.manipulation.estimate import Study, estimate_prepared
+from pbrl_namo.manipulation.plan import Estimate
+from pbrl_namo.manipulation.settings import ManipulationSettings
+from pbrl_namo.manipulation.yard import Yard
+from pbrl_namo.mdp.expansion import expand
+from pbrl_namo.mdp.settings import MdpSettings
+from pbrl_namo.mdp.value_iteration import Policy
+from pbrl_namo.regions.free_space import FreeSpace, drive_radius, free_space
+from pbrl_namo.regions.openings import Opening, cut_off, openings
+from pbrl_namo.regions.roadmap import Roadmap, build_roadmap
+from pbrl_namo.regions.settings import RegionSettings
+from pbrl_namo.regions.whereabouts import region_of
+from pbrl_namo.scene import NamoScene
+
+Result = TypeVar("Result")
+TOLD = 6  # openings of which the reason says why they cannot be made
+
+
+class NamoSettings(Section):
+    """Everything that can be set about planning.
+
+    Attributes:
+        regions: free space, roadmap and grasp samples.
+        beliefs: what furniture is like before it was pushed.
+        manipulation: Monte-Carlo manipulation.
+        mdp: the upper level.
+    """
+
+    regions: RegionSettings = RegionSettings()
+    beliefs: BeliefSettings = BeliefSettings()
+    manipulation: ManipulationSettings = ManipulationSettings()
+    mdp: MdpSettings = MdpSettings()
+
+    @model_validator(mode="after")
+    def _one_gripper(self) -> Self:
+        if self.regions.grasp != self.manipulation.grasping:
+            raise ValueError("expected regions.grasp and manipulation.grasping alike; they are of the same grippers")
+        return self
+
+
+@dataclass(frozen=True)
+class NamoPlan:
+    """What to do next.
+
+    Attributes:
+        free: the regions.
+        start: the region that the robot is in; None where it is in none.
+        goal: the region that is wanted; None where it is none.
+        openings: that there are.
+        estimates: of each; None where it did not matter.
+        policy: of the upper level; None where there was nothing to decide.
+        chosen: what to do next; None where the robot can just drive, or nothing can be done.
+        reason: why nothing is chosen, in words; empty where something is.
+        drive: whether the goal is reached without moving anything.
+        cut_off: regions that no sequence of openings reaches from the start.
+        seconds: that each part took [s].
+    """
+
+    free: FreeSpace
+    start: int | None
+    goal: int | None
+    openings: tuple[Opening, ...] = ()
+    estimates: tuple[Estimate | None, ...] = ()
+    policy: Policy | None = None
+    chosen: Estimate | None = None
+    reason: str = ""
+    drive: bool = False
+    cut_off: tuple[int, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+
+def prior_beliefs(scene: NamoScene, seed: int, settings: NamoSettings | None = None) -> dict[str, ObjectBelief]:
+    """Return what is believed of everything movable before anything was pushed.
+
+    Raises:
+        NamoError: a guessed mass is not above zero.
+    """
+    settings = settings or NamoSettings()
+    return {
+        name: prior_belief(thing, np.random.default_rng([seed, 2, index]), settings.beliefs)
+        for index, (name, thing) in enumerate(scene.movable.items())
+    }
+
+
+def plan(
+    scene: NamoScene, beliefs: Mapping[str, ObjectBelief], seed: int, settings: NamoSettings | None = None
+) -> NamoPlan:
+    """Plan what to move next; same seed, same plan.
+
+    Args:
+        scene: what is known of the room, now.
+        beliefs: of everything movable that may have to be moved.
+        seed: of the roadmap and the sampled worlds.
+        settings: of everything.
+
+    Raises:
+        NamoError: nothing is believed of a thing that could be moved, or a belief is not of it.
+    """
+    settings = settings or NamoSettings()
+    clock = _Clock()
+    radius = settings.regions.radius
+    size = drive_radius(scene.robot, settings.regions.margin) if radius is None else radius
+    free = clock("regions", lambda: free_space(scene, size))
+    start, fault = _region(scene, free, scene.start, "start")
+    goal, other = _region(scene, free, scene.goal, "goal")
+    if start is None or goal is None:
+        return NamoPlan(free, start, goal, reason=fault or other, seconds=clock.seconds)
+    if start == goal:
+        why = "the goal is reached without moving anything: drive there"
+        return NamoPlan(free, start, goal, reason=why, drive=True, seconds=clock.seconds)
+    roadmap = clock("roadmap", lambda: build_roadmap(scene, np.random.default_rng([seed, 0]), settings.regions))
+    found = clock("openings", lambda: openings(scene, free, roadmap))
+    away = cut_off(free, found, start)
+    if goal in away:
+        why = _unreachable(free, start, goal, away)
+        return NamoPlan(free, start, goal, found, (None,) * len(found), reason=why, cut_off=away, seconds=clock.seconds)
+    maker = _Maker(scene, free, roadmap, beliefs, seed, settings.manipulation, clock)
+    best = best_reward(settings.manipulation.cost)
+    made = clock.around("values", lambda: expand(len(free.regions), start, goal, found, maker, best, settings.mdp))
+    action = made.policy.best[start]
+    chosen = None if action is None else made.estimates[action]
+    reason = "" if chosen is not None else _hopeless(start, goal, made.estimates)
+    return NamoPlan(free, start, goal, found, made.estimates, made.policy, chosen, reason, False, away, clock.seconds)
+
+
+def _region(scene: NamoScene, free: FreeSpace, pose: Array, what: str) -> tuple[int | None, str]:
+    """Return the region that a pose (3,) belongs to, or why it belongs to none, in words."""
+    try:
+        return region_of(scene, free, pose, what), ""
+    except NamoError as error:
+        return None, str(error)
+
+
+class _Clock:
+    """Says how long each part took."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    def __call__(self, part: str, work: Callable[[], Result]) -> Result:
+        """Do something, and add the time to a part [s]."""
+        before = time.perf_counter()
+        result = work()
+        self.seconds[part] = self.seconds.get(part, 0.0) + time.perf_counter() - before
+        return result
+
+    def around(self, part: str, work: Callable[[], Result]) -> Result:
+        """Do the same with work that times parts of itself, whose times are not the part's."""
+        inside = sum(self.seconds.values())
+        result = self(part, work)
+        self.seconds[part] -= sum(self.seconds.values()) - self.seconds[part] - inside
+        return result
+
+
+class _Maker:
+    """Estimates openings of one scene; each thing's worlds are drawn once, by a seed of its own."""
+
+    def __init__(
+        self,
+        scene: NamoScene,
+        free: FreeSpace,
+        roadmap: Roadmap,
+        beliefs: Mapping[str, ObjectBelief],
+        seed: int,
+        settings: ManipulationSettings,
+        clock: _Clock,
+    ) -> None:
+        self._scene, self._free, self._roadmap, self._beliefs = scene, free, roadmap, beliefs
+        self._seed, self._settings, self._clock = seed, settings, clock
+        self._names = list(scene.movable)
+        self._studies: dict[str, Study] = {}
+        self._yard: Yard | None = None
+
+    def __call__(self, opening: Opening) -> Estimate:
+        """Return the estimate of an opening."""
+        if self._yard is None:
+            self._yard = self._clock("scene", self._prepare)
+        yard = self._yard
+        for name in (opening.object, *opening.then):
+            if name not in self._studies:
+                self._studies[name] = self._clock("worlds", partial(self._study, name))
+        return self._clock(
+            "manipulation",
+            lambda: estimate_prepared(yard, self._free, self._roadmap, opening, self._studies, self._settings),
+        )
+
+    def _prepare(self) -> Yard:
+        return Yard.of(self._scene, self._free.radius, self._settings.cell)
+
+    def _study(self, name: str) -> Study:
+        rng = np.random.default_rng([self._seed, 1, self._names.index(name)])
+        return Study.of(self._scene, name, self._beliefs, rng, self._settings)
+
+
+def _unreachable(free: FreeSpace, start: int, goal: int, away: tuple[int, ...]) -> str:
+    """Say that no sequence of openings reaches the goal, and what is cut off."""
+    regions = ", ".join(f"{region} ({free.regions[region].area:.1f} m^2)" for region in away)
+    return f"the goal's region {goal} cannot be reached from region {start}, whatever is moved; cut off: {regions}"
+
+
+def _hopeless(start: int, goal: int, estimates: tuple[Estimate | None, ...]) -> str:
+    """Say of each opening that was looked at why it cannot be made."""
+    tried = [each for each in estimates if each is not None]
+    why = list(dict.fromkeys(each.reason or f"{each.opening.object!r} is not worth it" for each in tried))
+    more = f"; and {len(why) - TOLD} more" if len(why) > TOLD else ""
+    return f"no way from region {start} to the goal's region {goal}: {'; '.join(why[:TOLD])}{more}"

@@ -1,0 +1,512 @@
+"""Whole stories in a world without physics: the thesis's first experiment, and what goes wrong on the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from office_of_fakes import DT, GOAL, SETTINGS, Brain, Office, executive_in, light, office
+from room_of_fakes import NOMINAL
+
+from pbrl_control.errors import ControlError
+from pbrl_control.kinematics import RobotKinematics
+from pbrl_control.loop import ControlLoop
+from pbrl_control.percept import Grip, Percept
+from pbrl_control.settings import ControllerSettings
+from pbrl_namo.errors import NamoError
+from pbrl_namo.executive import (
+    GraspJob,
+    ImmediateThinker,
+    LearnJob,
+    MismatchJob,
+    Move,
+    NamoExecutive,
+    Order,
+    PlanJob,
+    State,
+    status_of,
+)
+from pbrl_namo.executive.table import DRIVING, Event
+
+
+@pytest.fixture
+def world(kinematics: RobotKinematics) -> Office:
+    return office(kinematics)
+
+
+def events(executive: NamoExecutive) -> list[Event]:
+    return [change.event for change in executive.mission.account.log]
+
+
+def once(world: Office, state: State, act: Callable[[], None], after: float = 0.0) -> None:
+    """Do something once, so long after a state was entered for the first time."""
+    since: list[float] = []
+
+    def happens(world: Office) -> None:
+        if world.states[-1] == state and not since:
+            since.append(world.time)
+        if since and world.time >= since[0] + after - 1e-9:
+            world.happens = lambda world: None  # type: ignore[assignment,misc]
+            act()
+
+    world.happens = happens  # type: ignore[assignment]
+
+
+def hide(world: Office, *names: str) -> None:
+    world.tamper = lambda _, percept: replace(
+        percept, tags={name: each for name, each in percept.tags.items() if name not in names}
+    )
+
+
+def freeze(world: Office, *names: str) -> None:
+    """Show these tags as they are now for ever."""
+    old = {name: world.percept().tags[name] for name in names}
+    world.tamper = lambda _, percept: replace(percept, tags={**percept.tags, **old})
+
+
+def known(move: Move) -> Move:
+    """Return a move with a model of what is moved, as far as anybody knows."""
+    return replace(move, model=light())
+
+
+def test_experiment_1_a_stuck_table_is_learned_and_the_other_one_moved(world: Office) -> None:
+    """Thesis 6.5.1 and figure 43."""
+    world.pinned = {"table_a"}
+    brain = Brain(world, moves=known)
+    executive = executive_in(world, brain)
+    order = world.run(executive)
+    assert order.state == State.DONE, order.status
+    assert np.hypot(*(world.base - GOAL)[:2]) < 0.05
+    a_try = [State.LOOK, State.GET_READY, State.PLANNING, State.GET_GRASP_POINT, State.NAVIGATE, State.GRASP]
+    assert world.states == [
+        *(*a_try, State.CLEAR, State.UPDATE_MODEL, State.RELEASE),
+        *(*a_try, State.CLEAR, State.RELEASE),
+        *(State.LOOK, State.GET_READY, State.PLANNING, State.DRIVE_TO_GOAL, State.DONE),
+    ]
+    rows = executive.mission.account.rows()
+    assert rows["surprises"] == rows["calls to UpdateModel"] == 1.0
+    assert rows["openings"] == 1.0
+    assert rows["calls to the planner"] == 3.0
+    assert rows["free-space regions"] == 2.0
+    assert rows["overall runtime [s]"] == pytest.approx(world.time, abs=2 * DT)
+    assert world.things["table_a"].tolist() == [0.3, 1.55, 0.0]
+    assert world.things["table_b"][0] < -0.2
+    (learned,) = brain.asked(LearnJob)
+    clear, surprise = (next(c for c in executive.mission.account.log if c.after == s) for s in world.states[6:8])
+    assert learned.begin < clear.time < learned.end == surprise.time, "from the closed grip to the surprise"
+    assert surprise.event == Event.UNEXPECTED_FORCE
+    assert "expected 10 N and at most 40 N; learn the model again" in surprise.sentence
+    assert not world.grips
+
+
+def test_a_free_table_is_moved_at_once(world: Office) -> None:
+    executive = executive_in(world)
+    assert world.run(executive).state == State.DONE
+    assert Event.OPENED in events(executive)
+    assert executive.mission.account.surprises == 0
+    assert world.things["table_b"].tolist() == [0.3, -1.55, 0.0]
+
+
+def test_a_goal_in_the_same_region_is_driven_to(world: Office) -> None:
+    world.joints = NOMINAL.copy()  # arms low at the start
+    executive = executive_in(world, goal=np.array([-2.5, -1.5, 1.0]))
+    assert world.run(executive).state == State.DONE
+    assert world.states == [State.LOOK, State.GET_READY, State.PLANNING, State.DRIVE_TO_GOAL, State.DONE]
+    assert world.base == pytest.approx([-2.5, -1.5, 1.0], abs=0.05)
+
+
+def test_an_empty_room_is_driven_through(kinematics: RobotKinematics) -> None:
+    world = office(kinematics, things={}, bodies={}, fixed={})
+    assert world.run(executive_in(world)).state == State.DONE
+    assert State.GRASP not in world.states
+
+
+def test_nothing_is_done_before_the_scene_was_told(world: Office) -> None:
+    executive = NamoExecutive(GOAL, world.kinematics, ImmediateThinker(Brain(world)), settings=SETTINGS)
+    order = world.run(executive)
+    assert order.state == State.FAILED
+    assert "got none of the scene; tag 'wall_middle'" in order.status
+
+
+def test_a_goal_that_nothing_leads_to_is_said_to_be(world: Office) -> None:
+    executive = executive_in(world, beliefs={"table_a": "static", "table_b": "static"})
+    order = world.run(executive)
+    assert order.state == State.FAILED
+    assert order.status == "no way to the goal: nothing that could be moved; cut off: regions 1"
+    assert world.time < 1.0
+
+
+UNREACHABLE = {
+    "in a table": ([0.3, 1.55, math.nan], "goal: expected free floor, got (0.30, 1.55) in 'table_a'"),
+    "in a wall": ([1.0, 0.0, math.nan], "in 'wall_middle'"),
+    "outside": ([9.0, 0.0, math.nan], "outside of it"),
+}
+
+
+@pytest.mark.parametrize("case", UNREACHABLE)
+def test_a_goal_that_is_no_place_to_be_is_said_to_be(world: Office, case: str) -> None:
+    goal, sentence = UNREACHABLE[case]
+    order = world.run(executive_in(world, goal=np.array(goal)))
+    assert order.state == State.FAILED
+    assert sentence in order.status
+    assert len(world.states) == 4
+
+
+def test_a_goal_that_is_no_number_is_refused_at_once(world: Office) -> None:
+    with pytest.raises(NamoError, match="goal: expected"):
+        executive_in(world, goal=np.array([math.nan, 0.0, 0.0]))
+    executive = executive_in(world)
+    for goal in (np.zeros(2), np.array([0.0, math.inf, 0.0]), np.array([0.0, 0.0, math.inf])):
+        with pytest.raises(NamoError, match="goal: expected"):
+            executive.aim(goal)
+    assert world.run(executive, to=State.NAVIGATE).state == State.NAVIGATE, "the goal before still stands"
+
+
+def test_a_start_in_something_is_said(world: Office) -> None:
+    world.base = np.array([0.3, 1.55, 0.0])
+    order = world.run(executive_in(world))
+    assert order.state == State.FAILED
+    assert "start" in order.status
+
+
+def test_what_is_still_held_at_the_start_is_let_go_first(world: Office) -> None:
+    world.grips = {"left": Grip("table_a", np.array([-0.375, 0.0]))}
+    executive = executive_in(world, goal=np.array([-2.5, -1.5, 1.0]))
+    assert world.run(executive).state == State.DONE
+    assert world.states[:3] == [State.RELEASE, State.LOOK, State.GET_READY]
+
+
+@pytest.mark.parametrize("state", sorted(DRIVING))
+def test_a_gripper_that_closes_on_the_way_is_opened_before_anything_goes_on(world: Office, state: State) -> None:
+    world.joints = NOMINAL.copy()
+    executive = executive_in(world, goal=np.array([-2.5, 2.0, 0.0]) if state == State.DRIVE_TO_GOAL else GOAL)
+    world.run(executive, to=state)
+    for _ in range(8):
+        assert world.tick(executive).state == state
+    world.hands["left"] = np.array([*world.base, 0.8])
+    world.grips["left"] = Grip("table_a", np.zeros(2))
+    assert world.tick(executive).state == State.RELEASE
+    world.run(executive, to=State.LOOK)
+    assert not world.grips
+
+
+def test_a_model_that_does_not_explain_is_asked_about(world: Office) -> None:
+    world.pinned = {"table_a"}
+    brain = Brain(world, explains=False)
+    executive = executive_in(world, brain)
+    world.run(executive, to=State.RELEASE)
+    assert world.states[-3:] == [State.UPDATE_MODEL, State.ASK_MISMATCH, State.RELEASE]
+    (asked,) = brain.asked(MismatchJob)
+    (learned,) = brain.asked(LearnJob)
+    assert (asked.object, asked.begin, asked.end) == (learned.object, learned.begin, learned.end)
+    assert asked.belief == "static", "the model that was just learned"
+    rows = executive.mission.account.rows()
+    assert (rows["calls to UpdateModel"], rows["repaired models"]) == (1.0, 1.0)
+
+
+def test_nobody_is_asked_where_nobody_is_to_be(world: Office) -> None:
+    world.pinned = {"table_a"}
+    brain = Brain(world, explains=False)
+    executive = executive_in(world, brain, settings=SETTINGS.model_copy(update={"ask_mismatch": False}))
+    world.run(executive, to=State.RELEASE)
+    assert world.states[-2:] == [State.UPDATE_MODEL, State.RELEASE]
+    assert not brain.asked(MismatchJob)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "strongest", "state", "event"),
+    [(2000.0, 20.0, State.CLEAR, Event.STALLED), (20000.0, math.inf, State.GRASP, Event.UNEXPECTED_FORCE)],
+)
+def test_every_surprise_is_learned_from(
+    world: Office, stiffness: float, strongest: float, state: State, event: Event
+) -> None:
+    """Something stays where it is without much of a force; something is so fast that the test of the grip shows it."""
+    world.pinned, world.stiffness, world.strongest = {"table_a"}, stiffness, strongest
+    brain = Brain(world)
+    executive = executive_in(world, brain)
+    world.run(executive, to=State.UPDATE_MODEL)
+    last = executive.mission.account.log[-1]
+    assert (last.before, last.event) == (state, event)
+    world.run(executive, to=State.RELEASE)
+    assert executive.mission.beliefs == {"table_a": "static"}
+    (job,) = brain.asked(LearnJob)
+    assert job.begin < job.end
+
+
+THINKING = [State.PLANNING, State.GET_GRASP_POINT, State.UPDATE_MODEL, State.ASK_MISMATCH]
+KINDS = dict(zip(THINKING, (PlanJob, GraspJob, LearnJob, MismatchJob), strict=True))
+
+
+@pytest.mark.parametrize("state", THINKING)
+@pytest.mark.parametrize("what", ["cancel", "pause", "aim", "nothing"])
+def test_long_thoughts_can_be_interrupted(world: Office, state: State, what: str) -> None:
+    world.pinned = {"table_a"}
+    brain = Brain(world, explains=False, silent=(KINDS[state],))
+    executive = executive_in(world, thinker=brain)
+    world.run(executive, to=state)
+    held = state in (State.UPDATE_MODEL, State.ASK_MISMATCH)
+    if what == "cancel":
+        executive.cancel()
+        assert world.tick(executive).state == (State.RELEASE_AND_CANCEL if held else State.CANCELLED)
+        assert world.run(executive).state == State.CANCELLED
+    elif what == "pause":
+        executive.pause("sim_node is gone")
+        assert world.tick(executive).state == State.PAUSED
+        executive.resume()
+        assert world.tick(executive).state == (State.RELEASE if held else State.LOOK)
+    elif what == "aim":
+        executive.aim(np.array([-2.5, 2.0, math.nan]))
+        assert world.tick(executive).state == (state if held else State.LOOK)
+    else:
+        order = world.run(executive)
+        assert order.state == State.FAILED
+        assert "asked 3 times, the last time: no answer within 2 s" in order.status
+    assert bool(world.grips) == (held and what in ("pause", "aim"))
+
+
+def test_a_thinker_that_comes_back_is_asked_again(world: Office) -> None:
+    brain = Brain(world, lost={PlanJob: 2, GraspJob: 1})
+    executive = executive_in(world, brain)
+    assert world.run(executive, to=State.NAVIGATE).state == State.NAVIGATE
+    plans = brain.asked(PlanJob)
+    assert plans[0] is plans[1] is plans[2], "the same job"
+
+
+@pytest.mark.parametrize(("kind", "state"), [(PlanJob, State.PLANNING), (LearnJob, State.UPDATE_MODEL)])
+def test_a_thinker_that_stays_away_is_told_of(world: Office, kind: type, state: State) -> None:
+    world.pinned = {"table_a"}
+    executive = executive_in(world, Brain(world, lost={kind: 99}))
+    order = world.run(executive)
+    assert order.state == State.FAILED
+    assert "expected an answer, got none; asked 3 times, the last time: nobody at home" in order.status
+    assert not world.grips, "let go before it fails"
+    assert (State.RELEASE_AND_FAIL in world.states) == (state == State.UPDATE_MODEL)
+
+
+def test_a_move_that_never_opens_anything_is_left_alone_in_the_end(world: Office) -> None:
+    short = Brain(world, moves=lambda move: replace(move, segments=((np.array([-0.05, 0.0, 0.0]), 1.0),)))
+    settings = SETTINGS.model_copy(update={"tries": 1})
+    executive = executive_in(world, short, settings=settings)
+    order = world.run(executive)
+    assert order.state == State.FAILED
+    for name in ("table_a", "table_b"):
+        assert f"{name} is left alone after 1 tries: moved as planned, but there is no" in order.status
+    assert [job.tries for job in short.asked(PlanJob)] == [{}, {"table_a": 1}, {"table_a": 1, "table_b": 1}]
+    assert len(status_of(executive).notes) == 2
+
+
+def test_hands_that_never_close_are_given_up_elsewhere_each_time(world: Office) -> None:
+    world.closes = False
+    settings = SETTINGS.model_copy(update={"tries": 2})
+    brain = Brain(world, order=("table_a",))
+    order = world.run(executive_in(world, brain, settings=settings))
+    assert order.state == State.FAILED
+    assert "table_a is left alone after 2 tries" in order.status
+    assert "nothing between the plates" in order.status
+    first, second = brain.asked(GraspJob)
+    assert (len(first.avoid), len(second.avoid)) == (0, 1)
+
+
+def test_a_gripper_that_does_not_open_is_told_of(world: Office) -> None:
+    world.opens = False
+    order = world.run(executive_in(world))
+    assert order.state == State.FAILED
+    assert "release: expected open grippers within 2 s" in order.status
+    assert "says 'its plates do not move'" in order.status
+    assert world.grips
+
+
+def test_a_table_whose_tag_is_lost_while_it_is_held_is_let_go_and_left(world: Office) -> None:
+    once(world, State.CLEAR, lambda: freeze(world, "table_a"), after=0.5)
+    executive = executive_in(world)
+    order = world.run(executive)
+    assert Event.TAG_LOST in events(executive)
+    assert executive.mission.vanished == ("table_a",)
+    assert order.state == State.DONE, order.status
+    assert world.things["table_b"][0] < -0.2, "the other one was moved instead"
+
+
+def test_an_object_that_vanishes_on_the_way_is_left_alone(world: Office) -> None:
+    once(world, State.NAVIGATE, lambda: freeze(world, "table_a"), after=2.0)
+    executive = executive_in(world)
+    for _ in range(2):
+        world.run(executive, to=State.GET_GRASP_POINT)
+    assert Event.VANISHED in events(executive)
+    assert executive.mission.object == "table_b"
+
+
+def test_a_table_that_somebody_moves_is_planned_for_anew(world: Office) -> None:
+    def shove() -> None:
+        world.things["table_a"] = np.array([-0.4, 1.2, 0.3])
+
+    once(world, State.NAVIGATE, shove, after=3.0)
+    executive = executive_in(world)
+    world.run(executive, to=State.LOOK)
+    assert events(executive)[-1] == Event.WAY_LOST
+    assert world.run(executive, to=State.NAVIGATE).state == State.NAVIGATE
+
+
+@pytest.mark.parametrize("state", [State.NAVIGATE, State.GRASP, State.CLEAR, State.UPDATE_MODEL, State.DRIVE_TO_GOAL])
+def test_a_new_goal_in_mid_action_is_gone_to(world: Office, state: State) -> None:
+    world.pinned = {"table_a"} if state == State.UPDATE_MODEL else set()
+    elsewhere = np.array([-2.5, 2.0, math.nan])
+    executive = executive_in(world)
+    once(world, state, lambda: executive.aim(elsewhere), after=0.0 if state == State.UPDATE_MODEL else 1.0)
+    order = world.run(executive)
+    assert order.state == State.DONE, order.status
+    assert np.hypot(*(world.base - elsewhere)[:2]) < 0.05
+    assert executive.mission.goal is not None
+    if state == State.UPDATE_MODEL:
+        assert executive.mission.beliefs == {"table_a": "static"}, "what was felt is learned all the same"
+
+
+def test_after_the_end_there_can_be_another_goal(world: Office) -> None:
+    executive = executive_in(world, goal=np.array([-2.5, -1.5, math.nan]))
+    assert world.run(executive).state == State.DONE
+    executive.aim(np.array([-2.5, 1.5, math.nan]))
+    assert world.tick(executive).state == State.LOOK
+    assert world.run(executive).state == State.DONE
+    assert world.base[:2] == pytest.approx([-2.5, 1.5], abs=0.05)
+
+
+@pytest.mark.parametrize("state", [State.LOOK, State.NAVIGATE, State.GRASP, State.CLEAR, State.DRIVE_TO_GOAL])
+def test_who_is_told_to_stop_stops(world: Office, state: State) -> None:
+    executive = executive_in(world, goal=np.array([-2.5, -1.5, 0.0]) if state == State.DRIVE_TO_GOAL else GOAL)
+    once(world, state, lambda: executive.cancel("the visitor has left"), after=0.1 if state == State.LOOK else 1.0)
+    order = world.run(executive)
+    assert order.state == State.CANCELLED
+    assert order.status == "the visitor has left"
+    assert not world.grips
+
+
+@pytest.mark.parametrize("state", [State.NAVIGATE, State.CLEAR])
+def test_who_is_gone_is_waited_for_at_rest(world: Office, state: State) -> None:
+    executive = executive_in(world)
+
+    def gone() -> None:
+        executive.pause("body_controller_node is gone")
+        once(world, State.PAUSED, executive.resume, after=2.0)
+
+    once(world, state, gone, after=1.0)
+    for _ in range(2):
+        assert world.run(executive, to=State.PLANNING).state == State.PLANNING
+    after = world.states[world.states.index(State.PAUSED) + 1]
+    assert after == (State.RELEASE if state == State.CLEAR else State.LOOK)
+    assert executive.mission.account.seconds[State.PAUSED] == pytest.approx(2.0, abs=0.2)
+
+
+def test_who_never_comes_back_is_told_of(world: Office) -> None:
+    executive = executive_in(world)
+    once(world, State.CLEAR, lambda: executive.pause("sim_node is gone"), after=1.0)
+    order = world.run(executive)
+    assert order.state == State.FAILED
+    assert order.status.startswith("sim_node is gone, for more than 5 s; still left holds 'table_a', right holds")
+
+
+def test_a_clock_that_is_set_back_is_rested_for(world: Office) -> None:
+    executive = executive_in(world)
+
+    def back() -> None:
+        world.time -= 5.0
+
+    once(world, State.NAVIGATE, back, after=2.0)
+    for _ in range(2):
+        assert world.run(executive, to=State.PLANNING).state == State.PLANNING
+    assert "the clock was set back" in next(
+        change.sentence for change in executive.mission.account.log if change.event == Event.LINK_LOST
+    )
+
+
+def test_lost_odometry_is_said_in_the_end(world: Office) -> None:
+    def lose() -> None:
+        world.odometry = False
+
+    once(world, State.NAVIGATE, lose, after=2.0)
+    order = world.run(executive_in(world))
+    assert order.state == State.FAILED
+    assert "odometry: expected one in the last 0.3 s" in order.status
+
+
+def test_it_gives_up_after_its_time(world: Office) -> None:
+    executive = executive_in(world, settings=SETTINGS.model_copy(update={"time_limit": 20.0}))
+    order = world.run(executive)
+    assert order.state == State.FAILED
+    assert order.status.startswith("gave up: expected to be there within 20 s")
+    assert world.time < 26.0
+
+
+def test_it_gives_up_after_its_plans(world: Office) -> None:
+    world.base_moves = False
+    executive = executive_in(world, settings=SETTINGS.model_copy(update={"plans": 2, "tries": 99}))
+    order = world.run(executive)
+    assert order.state == State.FAILED
+    assert "expected to be there with 2 plans" in order.status
+
+
+def test_beliefs_of_others_are_planned_with(world: Office) -> None:
+    executive = executive_in(world)
+    executive.believe("table_a", "static")
+    world.run(executive, to=State.GET_GRASP_POINT)
+    assert executive.mission.object == "table_b"
+
+
+def test_what_it_tells_is_what_it_does(world: Office) -> None:
+    executive = executive_in(world, Brain(world, moves=known))
+    told = []
+
+    def tell(world: Office) -> None:
+        told.append(status_of(executive))
+
+    world.happens = tell  # type: ignore[assignment]
+    world.run(executive)
+    moving = [status for status in told if status.state == State.CLEAR and math.isfinite(status.force_limit)]
+    assert moving
+    assert all(status.object == "table_a" for status in moving)
+    assert {(status.region, status.target, status.regions) for status in moving} == {(0, 1, 2)}
+    assert all(math.isfinite(status.expected_force) and status.force_limit == 40.0 for status in moving)
+    assert max(status.felt_force for status in moving) == pytest.approx(world.friction, rel=0.2)
+    assert all(math.isnan(status.felt_force) for status in told if status.state == State.NAVIGATE)
+    last = status_of(executive)
+    assert (last.finished, last.success, last.sentence) == (True, True, "at the goal")
+    assert sum(last.seconds.values()) == pytest.approx(world.time, abs=2 * DT)
+
+
+def test_same_seed_same_story(kinematics: RobotKinematics) -> None:
+    ends = []
+    for _ in range(2):
+        world = office(kinematics)
+        executive = executive_in(world, goal=np.array([-2.5, 2.0, math.nan]), seed=4)
+        world.run(executive)
+        ends.append((world.time, *world.base))
+    assert ends[0] == ends[1]
+
+
+def test_it_is_an_executive_like_any_other(world: Office) -> None:
+    executive = executive_in(world)
+    loop = ControlLoop(world.kinematics, executive)
+    command = loop.tick(0.0, world.percept())
+    assert isinstance(command.push, Order)
+    assert command.body.base_v == 0.0
+    assert loop.tick(0.02, Percept()).push.state == State.LOOK  # type: ignore[attr-defined]
+
+
+def test_a_controller_that_never_stows_is_refused(world: Office) -> None:
+    with pytest.raises(ControlError, match="stow_idle_arm"):
+        NamoExecutive(
+            GOAL,
+            world.kinematics,
+            ImmediateThinker(Brain(world)),
+            controller=ControllerSettings(stow_idle_arm=False),
+        )
+
+
+def test_times_that_are_none_are_rested_through(world: Office) -> None:
+    executive = executive_in(world)
+    for now in (math.nan, math.inf):
+        order = executive.tick(now, world.percept())
+        assert not any(twist.moves() for twist in order.twists.values())
+        assert "time: expected a finite number" in order.status
+    assert world.run(executive, to=State.NAVIGATE).state == State.NAVIGATE

@@ -1,0 +1,199 @@
+"""The planner in a room like the thesis's (figures 43 and 44): which table is moved, how, and why none is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+import shapely
+
+from pbrl_control.constraints.classes import ModelClass
+from pbrl_namo.beliefs import ObjectBelief, belief_of_draws
+from pbrl_namo.errors import NamoError
+from pbrl_namo.manipulation import ManipulationSettings
+from pbrl_namo.mdp import MdpSettings
+from pbrl_namo.planner import NamoPlan, NamoSettings, plan, prior_beliefs
+from pbrl_namo.scene import Movable, NamoScene
+
+QUICK = NamoSettings(manipulation=ManipulationSettings(worlds=20))
+
+
+def box(width: float, height: float, x: float = 0.0, y: float = 0.0) -> np.ndarray:
+    return np.array([[-width, -height], [width, -height], [width, height], [-width, height]]) / 2.0 + [x, y]
+
+
+def room(
+    goal: tuple[float, float] = (5.2, 2.0), start: tuple[float, float] = (0.9, 2.0), **things: Movable
+) -> NamoScene:
+    """6 m by 4 m, split by a square table of 33 kg and a long one of 38 kg."""
+    movable = {"square": Movable(box(0.8, 0.8), 0.75, 33.0), "long": Movable(box(0.75, 1.5), 0.75, 38.0), **things}
+    poses = {"square": np.array([3.0, 0.85, 0.0]), "long": np.array([3.0, 2.8, 0.0])}
+    return NamoScene.of(box(6.0, 4.0, 3.0, 2.0), {}, movable, poses, np.array([*start, 0.0]), np.array([*goal, np.nan]))
+
+
+def rolling(thing: Movable) -> ObjectBelief:
+    return belief_of_draws(thing, ("mass", "mu_ground"), np.array([[thing.mass, 0.02]] * 20))
+
+
+def stuck(thing: Movable) -> ObjectBelief:
+    return belief_of_draws(thing, ("mass", "mu_x", "mu_y", "mu_ground"), np.array([[300.0, 0.9, 0.9, 0.9]] * 20))
+
+
+def pinned(thing: Movable, x: float, y: float) -> ObjectBelief:
+    rng = np.random.default_rng(3)
+    places = np.array([x, y]) + 0.005 * rng.standard_normal((40, 2))
+    rest = np.tile([0.2, 0.25, 0.25, 0.02, thing.mass], (40, 1))
+    names = ("wheel_x", "wheel_y", "wheel_theta", "mu_x", "mu_y", "mu_ground", "mass")
+    return belief_of_draws(thing, names, np.hstack((places, rest)))
+
+
+def beliefs_of(scene: NamoScene, **known: ObjectBelief) -> Mapping[str, ObjectBelief]:
+    return {name: known.get(name, rolling(thing)) for name, thing in scene.movable.items()}
+
+
+def moved_next(found: NamoPlan) -> str:
+    assert found.chosen is not None, found.reason
+    assert found.chosen.plan is not None
+    return found.chosen.plan.object
+
+
+def test_the_lighter_table_is_moved_first_where_both_roll() -> None:
+    scene = room()
+    found = plan(scene, beliefs_of(scene), 0, QUICK)
+    assert found.start != found.goal
+    assert moved_next(found) == "square"
+    assert found.policy is not None
+    assert found.start is not None
+    assert 150.0 < found.policy.values[found.start] < 200.0
+
+
+def test_a_table_that_was_found_static_is_left_and_the_other_is_moved() -> None:
+    """Experiment 1."""
+    scene = room()
+    found = plan(scene, beliefs_of(scene, square=stuck(scene.movable["square"])), 0, QUICK)
+    assert moved_next(found) == "long"
+
+
+def test_a_table_with_a_locked_caster_is_turned_about_it() -> None:
+    """Experiment 2."""
+    scene = room()
+    known = {"square": stuck(scene.movable["square"]), "long": pinned(scene.movable["long"], -0.3, 0.68)}
+    found = plan(scene, beliefs_of(scene, **known), 0, QUICK)
+    assert moved_next(found) == "long"
+    assert found.chosen is not None
+    turn = found.chosen.plan
+    assert turn is not None
+    assert turn.model_class == ModelClass.FIXED_POINT
+    assert turn.centre == pytest.approx([-0.3, 0.68], abs=0.03)
+
+
+def test_where_both_are_static_there_is_no_way_and_that_is_said() -> None:
+    scene = room()
+    found = plan(scene, beliefs_of(scene, **{name: stuck(thing) for name, thing in scene.movable.items()}), 0, QUICK)
+    assert found.chosen is None
+    assert not found.drive
+    assert "'square' cannot be moved" in found.reason
+    assert "'long' cannot be moved" in found.reason
+    assert "\n" not in found.reason
+    assert found.policy is not None
+    assert found.start is not None
+    assert found.policy.values[found.start] == 0.0
+
+
+def test_by_the_prior_something_is_likely_to_work() -> None:
+    scene = room()
+    found = plan(scene, prior_beliefs(scene, 0), 0)
+    assert found.chosen is not None
+    assert 0.4 < found.chosen.probability < 1.0
+    plan_now = found.chosen.plan
+    assert plan_now is not None
+    assert plan_now.works <= found.chosen.probability
+    assert 1.0 < plan_now.expected_force <= plan_now.highest_force < 300.0
+
+
+def test_a_goal_on_this_side_is_driven_to() -> None:
+    scene = room(goal=(1.0, 3.0))
+    found = plan(scene, {}, 0)
+    assert found.drive
+    assert found.chosen is None
+    assert found.start == found.goal
+    assert "drive" in found.reason
+
+
+def test_a_goal_behind_a_wall_is_cut_off_whatever_is_moved() -> None:
+    plain = room()
+    wall = shapely.Polygon(box(0.1, 4.0, 4.2, 2.0))
+    scene = NamoScene(plain.room, {"wall": wall}, plain.movable, plain.poses, plain.start, plain.goal)
+    found = plan(scene, beliefs_of(scene), 0, QUICK)
+    assert found.chosen is None
+    assert found.goal in found.cut_off
+    assert "whatever is moved" in found.reason
+    assert "m^2" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("scene", "word"),
+    [
+        (room(goal=(3.0, 2.8)), "'long'"),
+        (room(goal=(9.0, 2.0)), "goal"),
+        (room(goal=(3.0, 1.6)), "goal"),
+        (room(start=(2.2, 2.6)), "start"),
+        (room(start=(-1.0, 2.0)), "start"),
+    ],
+)
+def test_a_start_or_goal_that_cannot_be_is_said_in_a_line(scene: NamoScene, word: str) -> None:
+    found = plan(scene, beliefs_of(scene), 0, QUICK)
+    assert found.chosen is None
+    assert not found.drive
+    assert word in found.reason
+    assert "\n" not in found.reason
+
+
+def test_same_seed_same_plan() -> None:
+    scene = room()
+    beliefs = prior_beliefs(scene, 3)
+    first, again = (plan(scene, beliefs, 3, QUICK) for _ in range(2))
+    assert first.openings == again.openings
+    assert first.policy is not None
+    assert again.policy is not None
+    assert first.policy.q.tobytes() == again.policy.q.tobytes()
+    assert first.chosen is not None
+    assert again.chosen is not None
+    assert first.chosen.plan is not None
+    assert again.chosen.plan is not None
+    assert first.chosen.plan.stand.tobytes() == again.chosen.plan.stand.tobytes()
+    assert first.chosen.plan.twist.tobytes() == again.chosen.plan.twist.tobytes()
+
+
+def test_all_estimates_lead_to_the_same_choice_as_those_needed() -> None:
+    scene = room()
+    beliefs = prior_beliefs(scene, 1)
+    needed = plan(scene, beliefs, 1, QUICK)
+    whole = plan(scene, beliefs, 1, QUICK.model_copy(update={"mdp": MdpSettings(expand="all")}))
+    assert moved_next(needed) == moved_next(whole)
+    assert None in needed.estimates
+    assert None not in whole.estimates
+    assert needed.policy is not None
+    assert whole.policy is not None
+    assert needed.start is not None
+    assert needed.policy.values[needed.start] == pytest.approx(whole.policy.values[needed.start])
+
+
+def test_what_each_part_took_is_told() -> None:
+    scene = room()
+    found = plan(scene, beliefs_of(scene), 0, QUICK)
+    assert set(found.seconds) == {"regions", "roadmap", "openings", "scene", "worlds", "manipulation", "values"}
+    assert all(seconds >= 0.0 for seconds in found.seconds.values())
+
+
+def test_what_nobody_believes_anything_of_is_refused() -> None:
+    scene = room()
+    with pytest.raises(NamoError, match="prior_belief"):
+        plan(scene, {}, 0, QUICK)
+
+
+def test_grippers_are_the_same_everywhere() -> None:
+    grasping = QUICK.manipulation.grasping.model_copy(update={"standoff": 0.2})
+    with pytest.raises(ValueError, match="alike"):
+        NamoSettings(manipulation=ManipulationSettings(grasping=grasping))
