@@ -22,6 +22,7 @@ NODES = [
     ("pbrl_model", "model_node"),
     ("pbrl_model", "tag_detector_node"),
     ("pbrl_mismatch", "mismatch_node"),
+    ("pbrl_namo", "namo_node"),
 ]
 
 
@@ -64,6 +65,7 @@ def test_every_package_is_in_the_index(package: str) -> None:
         ("pbrl_control", "push_node", 'plan:="turn_tabel"', "turn_table"),
         ("pbrl_model", "model_node", 'priors:="nowhere.yaml"', "nowhere.yaml"),
         ("pbrl_mismatch", "mismatch_node", "without:=['carpet']", "carpet"),
+        ("pbrl_namo", "namo_node", 'goal:="over there"', "x y theta"),
         ("pbrl_bag", "player_node", 'bag:="nowhere"', "nowhere"),
     ],
 )

@@ -26,6 +26,8 @@ USER_ERRORS = {
     "pbrl_model.errors": "ModelError",
     "pbrl_mismatch.errors": "MismatchError",
     "pbrl_control.errors": "ControlError",
+    "pbrl_planner.errors": "PlannerError",
+    "pbrl_namo.errors": "NamoError",
     "bullet_sim.errors": "SimError",
     "pbrl_bringup.errors": "BringupError",
 }

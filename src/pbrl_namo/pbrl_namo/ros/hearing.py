@@ -1,0 +1,112 @@
+"""What is heard of robot and room, as one percept; the streams that a fetch needs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from pbrl_msgs.msg import Grasps, Scene
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+from pbrl_control.errors import ControlError
+from pbrl_control.kinematics import SIDES, Posture
+from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag
+from pbrl_control.planar import Array
+from pbrl_control.ros.conversions import (
+    bodies_from_msg,
+    grips_from_msg,
+    posture_from_msg,
+    tag_from_msg,
+    wrench_from_msg,
+)
+from pbrl_control.ros.floor_conversions import odometry_from_msg
+from pbrl_control.ros.qos import LATCHED, NEWEST
+
+JOINT_STATES, SHARE = "/joint_states", "/body_controller/share"
+
+AHEAD = 1.0
+"""A stamp that lies further ahead than this is of a clock that has been set back [s]."""
+
+
+class Hearing:
+    """Subscribes to the streams and keeps the last message of each.
+
+    Args:
+        node: that hears.
+        scene: is told of each /scene.
+        odometry: is told when odometry was taken [s], and the pose (3,) of `base` in `odom` [m, rad].
+        alive: is told of each sign of life of `JOINT_STATES` and `SHARE`, and when it came on the steady clock [s].
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        scene: Callable[[Scene], None],
+        odometry: Callable[[float, Array], None],
+        alive: Callable[[str, float], None],
+    ) -> None:
+        self._node, self._scene, self._odometry, self._alive = node, scene, odometry, alive
+        self._posture: Posture | None = None
+        self._tags: dict[str, Tag] = {}
+        self._tag_topics: set[str] = set()
+        self._wrenches: dict[str, Array] = {}
+        self._grips: dict[str, Grip] = {}
+        self._bodies: dict[str, BodyShape] = {}
+        self._share = 1.0
+        node.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
+        node.create_subscription(Grasps, "/grasps", self._on_grasps, LATCHED)
+        node.create_subscription(JointState, JOINT_STATES, self._on_joints, NEWEST)
+        node.create_subscription(Odometry, "/odom", self._on_odometry, NEWEST)
+        node.create_subscription(Float64, SHARE, self._on_share, NEWEST)
+        for side in SIDES:
+            node.create_subscription(WrenchStamped, f"/wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
+            self._listen_to_tag(gripper_tag(side))
+
+    def percept(self, now: float) -> Percept:
+        """Return the latest of every stream, without tags that were seen on a clock that is ahead of `now` [s]."""
+        stale = [name for name, tag in self._tags.items() if tag.time > now + AHEAD]
+        for name in stale:
+            del self._tags[name]
+        return Percept(self._posture, dict(self._tags), dict(self._wrenches), self._grips, self._bodies, self._share)
+
+    def _listen_to_tag(self, name: str) -> None:
+        if name not in self._tag_topics:
+            self._tag_topics.add(name)
+            topic = f"/ar_tags/{name}/pose"
+            self._node.create_subscription(PoseStamped, topic, partial(self._on_tag, name), NEWEST)
+
+    def _on_scene(self, message: Scene) -> None:
+        self._bodies = bodies_from_msg(message)
+        for body in message.bodies:
+            if body.movable:
+                self._listen_to_tag(body.name)
+        self._scene(message)
+
+    def _on_grasps(self, message: Grasps) -> None:
+        self._grips = grips_from_msg(message)
+
+    def _on_joints(self, message: JointState) -> None:
+        try:
+            self._posture = posture_from_msg(message)
+        except ControlError as error:
+            self._node.get_logger().error(str(error), once=True)
+        else:
+            self._alive(JOINT_STATES, time.monotonic())
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self._odometry(*odometry_from_msg(message))
+
+    def _on_share(self, message: Float64) -> None:
+        self._share = message.data
+        self._alive(SHARE, time.monotonic())
+
+    def _on_wrench(self, side: str, message: WrenchStamped) -> None:
+        self._wrenches[side] = wrench_from_msg(message)
+
+    def _on_tag(self, name: str, message: PoseStamped) -> None:
+        self._tags[name] = tag_from_msg(message)

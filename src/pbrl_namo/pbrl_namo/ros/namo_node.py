@@ -1,0 +1,349 @@
+"""Node around `NamoExecutive`: brings the robot to a goal, moving what is in the way (thesis figure 42).
+
+Goals come by the action /reach_goal, by RViz on /goal_pose, or with the parameter `goal` at the start; the last one
+counts. /namo/status says where it is, /markers draws what it thinks. Nothing is commanded before the first goal and
+after the end. It ticks on the node's clock, simulated or not; where that clock stands still it goes on with looking
+after whoever is needed, on a steady clock: while the joint states, the body controller or the grippers' service are
+gone the robot rests, and what is held is let go when they are back.
+
+Plans, grasps and models are thought of in a thread, from all that was heard while something was held.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import rclpy
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from pbrl_msgs.msg import NamoStatus, ObjectModels, Scene
+from pbrl_msgs.srv import GraspObject, ReleaseObject
+from rclpy.client import Client
+from rclpy.clock import Clock, ClockType
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
+
+from pbrl_bag.errors import BagError
+from pbrl_bag.ros.parameters import declare, refuse_unknown
+from pbrl_bag.ros.stopping import WAIT, init_until_signal
+from pbrl_control.errors import ControlError
+from pbrl_control.installed import params_folder
+from pbrl_control.kinematics import SIDES, RobotKinematics
+from pbrl_control.planar import Array
+from pbrl_control.push import GripperAnswer, GripperRequest
+from pbrl_control.ros.conversions import expected_to_msg, twist_to_msg
+from pbrl_control.ros.floor_conversions import fixed_from_msg, room_from_msg
+from pbrl_control.ros.qos import COMMANDS, LATCHED
+from pbrl_control.settings import ControllerSettings, load_section
+from pbrl_model.errors import ModelError
+from pbrl_model.ros.listener import MEMORY, RecordingListener
+from pbrl_namo.beliefs.belief import ObjectBelief
+from pbrl_namo.errors import NamoError
+from pbrl_namo.executive import NamoExecutive, OpenByFreeSpace, Order, PoolThinker, State, status_of
+from pbrl_namo.executive.step import rest
+from pbrl_namo.executive.table import ENDED
+from pbrl_namo.ros.conversions import belief_from_msg, goal_from_pose, goal_from_text, masses_from_msg, status_to_msg
+from pbrl_namo.ros.goal_server import GoalServer
+from pbrl_namo.ros.hearing import JOINT_STATES, SHARE, Hearing
+from pbrl_namo.ros.liveness import Liveness
+from pbrl_namo.ros.markers import Drawing, draw
+from pbrl_namo.ros.planned import Planned
+from pbrl_namo.thinking import Thoughts
+
+GONE = 1.0
+"""Silence after which somebody counts as gone [s]."""
+
+LOOKS = 10.0
+"""Of whoever is needed, a second of the steady clock."""
+
+TOLD = 0.5
+"""Between two messages of status while the state stays the same [s]."""
+
+STUCK_CLOCK = 0.3
+"""Without a tick for so long [s of the steady clock], the node's clock stands still: a look is a tick, too."""
+
+GRASP_SERVICE = "/grasp"
+
+
+class NamoNode(Node):
+    """Navigation among movable obstacles."""
+
+    def __init__(self) -> None:
+        super().__init__("namo_node")
+        goal = declare(self, "goal", "", '"x y" or "x y theta" in world [m, rad], at once; empty: wait for one')
+        rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (10.0, 200.0))
+        self._seed = declare(self, "seed", 0, "of every draw, for goals that bring none", (0, 2**31 - 1))
+        memory = declare(self, "memory", MEMORY, "of what was heard while something was held [MB]", (10.0, 4000.0))
+        refuse_unknown(self)
+        self._first = goal_from_text(goal) if goal else None
+        self._settings = load_section(
+            params_folder("settings") / "body_controller.yaml", ControllerSettings, "settings"
+        )
+        self._listener = RecordingListener(f"{self.get_name()}_listener", self.context, memory)
+        self._planned = Planned(Thoughts(lambda begin, end: self._listener.recording()))
+        self._thinker = PoolThinker(self._planned, lambda: ThreadPoolExecutor(1))
+        self._kinematics: RobotKinematics | None = None
+        self._executive: NamoExecutive | None = None
+        self._beliefs: dict[str, ObjectBelief] = {}
+        self._scene: Scene | None = None
+        self._models: ObjectModels | None = None
+        self._goals: GoalServer | None = None  # offered when the robot is known: who sees it may send goals
+        self._state: State | None = None
+        self._paused = ""
+        self._ticked = self._told = -math.inf
+        self._drawing = Drawing()
+        self._live = Liveness((JOINT_STATES, SHARE, GRASP_SERVICE), GONE)
+        self._hearing = Hearing(self, self._on_scene, self._on_odometry, self._live.heard)
+        self.create_subscription(String, "/robot_description", self._on_description, LATCHED)
+        self.create_subscription(ObjectModels, "/object_models", self._on_models, LATCHED)
+        self._create_outputs()
+        self._listener.start()
+        self.create_timer(1.0 / rate, self._tick)
+        self.create_timer(1.0 / LOOKS, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    @property
+    def thinking(self) -> bool:
+        """Whether a job is being answered: its thread cannot be stopped."""
+        return self._planned.busy
+
+    def destroy_node(self) -> None:
+        """Let listener and thinker go with the node."""
+        self._thinker.close()
+        self._listener.stop()
+        if self._goals is not None:
+            self._goals.destroy()
+        super().destroy_node()
+
+    def _create_outputs(self) -> None:
+        self._status = self.create_publisher(NamoStatus, "/namo/status", LATCHED)
+        self._markers = self.create_publisher(MarkerArray, "/markers", COMMANDS)
+        self._twist = self.create_publisher(TwistStamped, "/object_twist_command", COMMANDS)
+        self._expected = {
+            side: self.create_publisher(WrenchStamped, f"/expected_grip_wrench/{side}", COMMANDS) for side in SIDES
+        }
+        self._callers: dict[str, Client] = {
+            "grasp": self.create_client(GraspObject, GRASP_SERVICE),
+            "release": self.create_client(ReleaseObject, "/release"),
+        }
+
+    # What comes in
+
+    def _on_description(self, message: String) -> None:
+        if self._kinematics is not None:
+            return
+        try:
+            self._kinematics = RobotKinematics(message.data)
+        except ControlError as error:
+            self.get_logger().error(str(error))
+            return
+        self._goals = GoalServer(self, self._aim, self._cancel)
+        self.create_subscription(PoseStamped, "/goal_pose", self._on_goal_pose, COMMANDS)
+        if self._first is not None:
+            self._aim(self._first, self._seed)
+
+    def _on_goal_pose(self, message: PoseStamped) -> None:
+        try:
+            goal = goal_from_pose(message)
+        except NamoError as error:
+            self.get_logger().error(f"refused: {error}")
+            return
+        if self._goals is not None:
+            self._goals.replaced("another goal was given on /goal_pose")
+        self._aim(goal, self._seed)
+
+    def _on_scene(self, message: Scene) -> None:
+        self._scene = message
+        self._tell_scene()
+        self._take_models()
+
+    def _on_odometry(self, stamp: float, pose: Array) -> None:
+        if self._executive is not None:
+            self._executive.odometry(stamp, pose)
+
+    def _on_models(self, message: ObjectModels) -> None:
+        self._models = message
+        self._take_models()
+
+    def _take_models(self) -> None:
+        """Believe what others have learned, once outlines are known too; each message once."""
+        if self._models is None or self._scene is None:
+            return
+        models, self._models = self._models.models, None
+        for model in models:
+            try:
+                belief = belief_from_msg(model, self._scene)
+            except (ModelError, NamoError, ControlError) as error:
+                self.get_logger().error(f"model of {model.object!r} is left aside: {error}")
+                continue
+            if belief is not None:
+                self._beliefs[model.object] = belief
+                if self._executive is not None:
+                    self._executive.believe(model.object, belief)
+
+    def _tell_scene(self) -> None:
+        if self._executive is not None and self._scene is not None:
+            scene = self._scene
+            self._executive.told(room_from_msg(scene), fixed_from_msg(scene), masses_from_msg(scene))
+
+    # Goals
+
+    def _aim(self, goal: Array, seed: int) -> None:
+        """Set out for a goal; under way the draws go on as they were begun."""
+        assert self._kinematics is not None
+        now = time.monotonic()
+        if self._executive is not None and self._executive.state not in ENDED:
+            self._executive.aim(goal)
+            return
+        if self._executive is not None:
+            self._beliefs.update(self._executive.mission.beliefs)
+        self._executive = NamoExecutive(
+            goal,
+            self._kinematics,
+            self._thinker,
+            opening=OpenByFreeSpace(),
+            controller=self._settings,
+            beliefs=self._beliefs,
+            seed=seed,
+        )
+        self._state, self._paused = None, ""
+        self._live.begin(now)
+        self._tell_scene()
+        self.get_logger().info(f"goal: {goal[0]:.2f} {goal[1]:.2f} {goal[2]:.2f}")
+
+    def _cancel(self) -> None:
+        if self._executive is not None:
+            self._executive.cancel()
+
+    # Ticks
+
+    def _tick(self) -> None:
+        now = self.get_clock().now()
+        if self._executive is None or now.nanoseconds == 0:  # zero: a simulated clock that nobody has set yet
+            return
+        self._ticked = time.monotonic()
+        seconds = now.nanoseconds * 1e-9
+        percept = self._hearing.percept(seconds)
+        order = self._executive.tick(seconds, percept)
+        ends = order.state in ENDED and order.state != self._state
+        # An end commands nothing: said once, the robot need not go on until its controller's watchdog stops it.
+        for target, twist in (rest(percept) if ends else order.twists).items():
+            self._twist.publish(twist_to_msg(target, twist, now.to_msg()))
+        for side, wrench in order.expected.items():
+            self._expected[side].publish(expected_to_msg(self._executive.plan.object, wrench, now.to_msg()))
+        for request in order.requests:
+            self._ask(request)
+        if order.state != self._state:
+            self._enter(order)
+
+    def _enter(self, order: Order) -> None:
+        self._state = order.state
+        self._tell()
+        if order.state == State.FAILED:  # rclpy remembers a severity for each line of code
+            self.get_logger().error(f"{order.state}: {order.status}")
+        else:
+            self.get_logger().info(f"{order.state}: {order.status}")
+
+    def _look(self) -> None:
+        """Look after whoever is needed, tell how things are, and tick where the node's clock stands still."""
+        if self._executive is None:
+            return
+        now = time.monotonic()
+        if self._callers["grasp"].service_is_ready():
+            self._live.heard(GRASP_SERVICE, now)
+        gone = self._live.complaint(now) if self._executive.state not in ENDED else ""
+        if gone:
+            self._executive.pause(gone)
+        elif self._paused:
+            self._executive.resume()
+        self._paused = gone
+        if now - self._ticked > STUCK_CLOCK:
+            self._tick()
+        if now - self._told >= TOLD:
+            self._tell()
+
+    def _tell(self) -> None:
+        """Publish status and markers; the action's feedback or result."""
+        assert self._executive is not None
+        self._told = time.monotonic()
+        status, stamp = status_of(self._executive), self.get_clock().now().to_msg()
+        message = status_to_msg(status, self._executive.mission.account, stamp)
+        self._status.publish(message)
+        if self._goals is not None:
+            self._goals.tell(message)
+        drawn = draw(status, self._executive.mission.planned.move, self._planned.floor)
+        self._markers.publish(self._drawing.update(drawn, stamp))
+
+    # Grippers
+
+    def _ask(self, request: GripperRequest) -> None:
+        client = self._callers[request.action]
+        if not client.service_is_ready():
+            sentence = f"no service {client.srv_name}; is the simulator or robot running?"
+            self._answer(GripperAnswer(request.action, request.side, False, sentence))
+            return
+        if request.action == "grasp":
+            call = client.call_async(GraspObject.Request(gripper=request.side, object=request.object))
+        else:
+            call = client.call_async(ReleaseObject.Request(gripper=request.side))
+        call.add_done_callback(partial(self._on_answer, request))
+
+    def _on_answer(self, request: GripperRequest, call: Future) -> None:
+        result = call.result()
+        if result is None:
+            sentence = f"the {request.action} service gave no result"
+            self._answer(GripperAnswer(request.action, request.side, False, sentence))
+            return
+        distance = float(getattr(result, "distance", 0.0))
+        self._answer(GripperAnswer(request.action, request.side, bool(result.success), str(result.message), distance))
+
+    def _answer(self, answer: GripperAnswer) -> None:
+        if self._executive is not None:
+            self._executive.answer(answer)
+
+
+def _spin(node: NamoNode, stop: threading.Event) -> None:
+    """Handle what comes, in the order in which it comes, until `stop` is set."""
+    executor = EventsExecutor()
+    executor.add_node(node)
+    try:
+        while rclpy.ok() and not stop.is_set():
+            executor.spin_once(timeout_sec=WAIT)
+    finally:
+        executor.remove_node(node)
+        executor.shutdown()
+
+
+def main() -> None:
+    """Run the node until it is told to stop."""
+    node, code, thinking = None, 0, False
+    try:
+        stop = init_until_signal()
+        node = NamoNode()
+        _spin(node, stop)
+    except (ControlError, BagError, NamoError) as error:
+        print(f"namo_node: {error}", file=sys.stderr)
+        code = 2
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        if node is not None:
+            thinking = node.thinking
+            node.destroy_node()
+        rclpy.try_shutdown()
+    if thinking:  # Python would wait for the thread, and learning can take minutes
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()
