@@ -9,12 +9,15 @@ import pytest
 import shapely
 
 from pbrl_control.constraints.classes import ModelClass
+from pbrl_control.planar import compose, inverse
 from pbrl_namo.beliefs import ObjectBelief, belief_of_draws
 from pbrl_namo.errors import NamoError
 from pbrl_namo.manipulation import ManipulationSettings
 from pbrl_namo.mdp import MdpSettings
 from pbrl_namo.planner import NamoPlan, NamoSettings, plan, prior_beliefs
+from pbrl_namo.regions import free_space
 from pbrl_namo.scene import Movable, NamoScene
+from pbrl_namo.scenes import random_office
 
 QUICK = NamoSettings(manipulation=ManipulationSettings(worlds=20))
 
@@ -130,6 +133,48 @@ def test_a_goal_behind_a_wall_is_cut_off_whatever_is_moved() -> None:
     assert found.goal in found.cut_off
     assert "whatever is moved" in found.reason
     assert "m^2" in found.reason
+
+
+def behind_a_door(cabinet: tuple[float, float, float]) -> NamoScene:
+    """A table beyond a door of 12 m by 5 m; who would grasp it through the door stands where a cabinet is."""
+    walls = {"low": box(0.1, 1.6, 6.05, 0.8), "high": box(0.1, 1.6, 6.05, 4.2)}
+    movable = {"table": Movable(box(0.75, 1.5), 0.7775, 33.0), "cabinet": Movable(box(0.45, 0.8), 0.7775, 35.0)}
+    poses = {"table": np.array([6.55, 2.5, 0.0]), "cabinet": np.array(cabinet)}
+    start, goal = np.array([1.0, 1.0, 0.0]), np.array([11.0, 2.5, np.nan])
+    return NamoScene.of(box(12.0, 5.0, 6.0, 2.5), walls, movable, poses, start, goal)
+
+
+def test_what_takes_the_room_to_stand_is_told_before_a_goal_is_given_up() -> None:
+    closed = behind_a_door((4.7, 2.5, 0.0))
+    found = plan(closed, beliefs_of(closed), 0, QUICK)
+    assert found.goal in found.cut_off
+    assert {room.blockers for room in found.rooms} == {("cabinet",)}
+    assert "'cabinet' first" in found.reason
+    assert "'table'" in found.reason
+    assert "whatever is moved" not in found.reason
+    assert "\n" not in found.reason
+    free = behind_a_door((1.0, 4.2, 0.0))
+    after = plan(free, beliefs_of(free), 0, QUICK)
+    assert after.rooms == ()
+    assert after.goal not in after.cut_off
+
+
+@pytest.mark.parametrize("number", [0, 1, 6, 36])
+def test_nothing_is_moved_again_that_has_done_its_part(number: int) -> None:
+    """Openings with further obstacles lead where these alone do not."""
+    scene = random_office(10, np.random.default_rng([0, 10, number]), move_needed=True)
+    beliefs = beliefs_of(scene)
+    for turn in range(3):
+        found = plan(scene, beliefs, turn, QUICK)
+        for opening in found.openings:
+            free = free_space(scene, found.free.radius, leave_out=opening.then)
+            ends = [found.free.regions[end].point_on_surface() for end in (opening.start, opening.end)]
+            assert free.index(np.array(ends[0].coords[0])) != free.index(np.array(ends[1].coords[0]))
+        if found.chosen is None or found.chosen.plan is None:
+            break
+        made = found.chosen.plan
+        leave = compose(inverse(scene.poses[made.object]), made.drive_to)
+        scene = scene.moved({made.object: made.end}, compose(made.end, leave))
 
 
 @pytest.mark.parametrize(

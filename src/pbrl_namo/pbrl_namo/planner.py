@@ -8,12 +8,13 @@ manipulation, and whenever a belief changes, everything is planned anew.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Self, TypeVar
 
 import numpy as np
+import shapely
 from pydantic import model_validator
 
 from pbrl_control.planar import Array
@@ -33,6 +34,7 @@ from pbrl_namo.regions.free_space import FreeSpace, drive_radius, free_space
 from pbrl_namo.regions.openings import Opening, cut_off, openings
 from pbrl_namo.regions.roadmap import Roadmap, build_roadmap
 from pbrl_namo.regions.settings import RegionSettings
+from pbrl_namo.regions.standing_room import StandingRoom, standing_room
 from pbrl_namo.regions.whereabouts import region_of
 from pbrl_namo.scene import NamoScene
 
@@ -77,6 +79,8 @@ class NamoPlan:
         reason: why nothing is chosen, in words; empty where something is.
         drive: whether the goal is reached without moving anything.
         cut_off: regions that no sequence of openings reaches from the start.
+        rooms: places to stand, at things that close what is cut off, that others take; looked for where the goal is
+            cut off.
         seconds: that each part took [s].
     """
 
@@ -90,6 +94,7 @@ class NamoPlan:
     reason: str = ""
     drive: bool = False
     cut_off: tuple[int, ...] = ()
+    rooms: tuple[StandingRoom, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -133,18 +138,25 @@ def plan(
         why = "the goal is reached without moving anything: drive there"
         return NamoPlan(free, start, goal, reason=why, drive=True, seconds=clock.seconds)
     roadmap = clock("roadmap", lambda: build_roadmap(scene, np.random.default_rng([seed, 0]), settings.regions))
-    found = clock("openings", lambda: openings(scene, free, roadmap))
+    found = clock("openings", lambda: _left(scene, free, openings(scene, free, roadmap)))
     away = cut_off(free, found, start)
     if goal in away:
-        why = _unreachable(free, start, goal, away)
-        return NamoPlan(free, start, goal, found, (None,) * len(found), reason=why, cut_off=away, seconds=clock.seconds)
+        draws = np.random.default_rng([seed, 3])
+        rooms = clock(
+            "standing room", lambda: standing_room(scene, free, roadmap, found, start, draws, settings.regions)
+        )
+        why = _unreachable(free, start, goal, away, rooms)
+        none = (None,) * len(found)
+        return NamoPlan(free, start, goal, found, none, None, None, why, False, away, rooms, clock.seconds)
     maker = _Maker(scene, free, roadmap, beliefs, seed, settings.manipulation, clock)
     best = best_reward(settings.manipulation.cost)
     made = clock.around("values", lambda: expand(len(free.regions), start, goal, found, maker, best, settings.mdp))
     action = made.policy.best[start]
     chosen = None if action is None else made.estimates[action]
     reason = "" if chosen is not None else _hopeless(start, goal, made.estimates)
-    return NamoPlan(free, start, goal, found, made.estimates, made.policy, chosen, reason, False, away, clock.seconds)
+    return NamoPlan(
+        free, start, goal, found, made.estimates, made.policy, chosen, reason, False, away, (), clock.seconds
+    )
 
 
 def _region(scene: NamoScene, free: FreeSpace, pose: Array, what: str) -> tuple[int | None, str]:
@@ -216,10 +228,33 @@ class _Maker:
         return Study.of(self._scene, name, self._beliefs, rng, self._settings)
 
 
-def _unreachable(free: FreeSpace, start: int, goal: int, away: tuple[int, ...]) -> str:
-    """Say that no sequence of openings reaches the goal, and what is cut off."""
+def _left(scene: NamoScene, free: FreeSpace, found: Sequence[Opening]) -> tuple[Opening, ...]:
+    """Return the openings that there is still something to be done for.
+
+    Of one with further obstacles the first has done its part as soon as only these are in the way. To move it again
+    opens nothing, yet would be taken for a success each time.
+    """
+    middles = [shapely.get_coordinates(region.point_on_surface())[0] for region in free.regions]
+    without = {
+        then: free_space(scene, free.radius, leave_out=then).indices(np.array(middles))
+        for then in {opening.then for opening in found if opening.then}
+    }
+    return tuple(
+        each for each in found if not each.then or without[each.then][each.start] != without[each.then][each.end]
+    )
+
+
+def _unreachable(free: FreeSpace, start: int, goal: int, away: tuple[int, ...], rooms: tuple[StandingRoom, ...]) -> str:
+    """Say that no sequence of openings reaches the goal, what is cut off, and whether more room to stand may help."""
     regions = ", ".join(f"{region} ({free.regions[region].area:.1f} m^2)" for region in away)
-    return f"the goal's region {goal} cannot be reached from region {start}, whatever is moved; cut off: {regions}"
+    if not rooms:
+        return f"the goal's region {goal} cannot be reached from region {start}, whatever is moved; cut off: {regions}"
+    room = rooms[0]
+    taken = " and ".join(map(repr, room.blockers))
+    return (
+        f"the goal's region {goal} cannot be reached from region {start} by moving what closes it; perhaps by moving "
+        f"{taken} first, to make room to stand before {room.object!r}; cut off: {regions}"
+    )
 
 
 def _hopeless(start: int, goal: int, estimates: tuple[Estimate | None, ...]) -> str:

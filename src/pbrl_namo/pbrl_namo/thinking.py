@@ -138,10 +138,10 @@ class Thoughts:
             recording = self._recorded(job.begin, job.end)
             options = self._fit.model_copy(update={"objects": (job.object,), "seed": job.seed})
             found = fit_recording(recording, options).objects[job.object]
-        except (BagError, ModelError) as error:
+            posterior = found.posterior.thinned(KEPT_DRAWS, np.random.default_rng(job.seed)).canonical()
+            belief = belief_of_draws(_movable(recording, job.object), posterior.names, posterior.flat)
+        except (BagError, ModelError, NamoError) as error:
             return Refused(_line(error))
-        posterior = found.posterior.thinned(KEPT_DRAWS, np.random.default_rng(job.seed)).canonical()
-        belief = belief_of_draws(_movable(recording, job.object), posterior.names, posterior.flat)
         unexplained = [note for note in found.notes if note.startswith(UNEXPLAINED)]
         return LearnAnswer(belief, not unexplained, "; ".join(unexplained), time.perf_counter() - begun)
 
@@ -152,16 +152,17 @@ class Thoughts:
             recording = self._recorded(job.begin, job.end)
             options = self._diagnosis.model_copy(update={"objects": (job.object,), "seed": job.seed})
             found = diagnose(recording, options).objects[job.object]
-        except (BagError, ModelError, MismatchError) as error:
+            names = " and ".join(each.effect for each in found.effects)
+            if not names:
+                why = "nothing that the library knows explains it"
+                return MismatchAnswer(None, why, time.perf_counter() - begun)
+            row = found.repaired.row
+            known = [name for name in KERNEL_COLUMNS if name in COLUMN and np.isfinite(row[COLUMN[name]])]
+            draws = np.array([[row[COLUMN[name]] for name in known]])
+            belief = belief_of_draws(_movable(recording, job.object), known, draws)
+        except (BagError, ModelError, MismatchError, NamoError) as error:
             return Refused(_line(error))
-        names = " and ".join(each.effect for each in found.effects)
-        seconds = time.perf_counter() - begun
-        if not names:
-            return MismatchAnswer(None, "nothing that the library knows explains it", seconds)
-        row = found.repaired.row
-        known = [name for name in KERNEL_COLUMNS if name in COLUMN and np.isfinite(row[COLUMN[name]])]
-        draws = np.array([[row[COLUMN[name]] for name in known]])
-        return MismatchAnswer(belief_of_draws(_movable(recording, job.object), known, draws), names, seconds)
+        return MismatchAnswer(belief, names, time.perf_counter() - begun)
 
 
 UNEXPLAINED = ("something that this model class does not have", "no parameters that the prior allows explain")

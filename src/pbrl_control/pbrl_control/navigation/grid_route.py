@@ -9,8 +9,11 @@ wider than a cell. No random draw, no clock: the same question has the same answ
 
 from __future__ import annotations
 
+import itertools
 import math
-from functools import cache
+import weakref
+from collections.abc import Iterable
+from functools import cache, lru_cache
 from itertools import pairwise
 
 import cv2
@@ -25,10 +28,13 @@ from pbrl_control.navigation.path import BasePath, Leg
 from pbrl_control.planar import Array, rotation, wrap
 
 Flags = NDArray[np.bool_]
+Cells = NDArray[np.uint8]
 States = list[tuple[int, int, int]]
 
 CELLS = (0.04, 0.025)
 """[m], tried one after the other; half a diagonal is less than the usual margin."""
+HALF_DIAGONAL = math.sqrt(0.5)
+"""Of a cell: so much is lost between the grid and what is exact, and kept as a margin where that is less."""
 OCTANT = ((1, 0), (5, 1), (5, 2), (3, 2), (1, 1))
 """Steps (columns, rows) whose directions are the headings of the first 45 degrees."""
 BETWEEN = 4
@@ -47,8 +53,12 @@ def grid_path(checker: MotionChecker, start: Array, goal: Array) -> BasePath | N
         start: where the base is.
         goal: where it is to be, reached exactly.
     """
+    start, goal = np.asarray(start, float), np.asarray(goal, float)
     for cell in CELLS:
-        found = _on_grid(_Grid(checker, cell), checker.bare(), np.asarray(start, float), np.asarray(goal, float))
+        grid = _grid(checker, cell)
+        if not grid.bare.connected(start[:2], goal[:2]):
+            return None
+        found = _on_grid(grid, grid.bare, start, goal)
         if found is not None:
             return found
     return None
@@ -74,9 +84,38 @@ def _on_grid(grid: _Grid, bare: MotionChecker, start: Array, goal: Array) -> Bas
     )
     if not len(found):
         return None
-    corners, reversed_ = _corners(grid, found, start, goal)
-    path = _path(_shortened(bare, start, goal, corners, reversed_), start, goal)
-    return path if _free(bare, path) else _if_free(bare, _path((corners, reversed_), start, goal))
+    corners, backwards = _corners(grid, found, start, goal)
+    for first, last in itertools.product((True, False), repeat=2):
+        # Out of a tight place the robot goes exactly straight; a cell lies a little beside that line.
+        points = list(corners)
+        if first:
+            points[1] = _ahead(start, points[1])
+        if last:
+            points[-2] = _ahead(goal, points[-2])
+        ways = (_shortened(bare, start, goal, points, backwards), (points, backwards))
+        path = next((way for way in (_path(each, start, goal) for each in ways) if _free(bare, way)), None)
+        if path is not None:
+            return path
+    return None
+
+
+_KEPT: dict[float, tuple[weakref.ref[MotionChecker], _Grid]] = {}
+"""The last grid of each cell size, and whose it is: who looks for a grasp asks one checker for many ways."""
+
+
+def _grid(checker: MotionChecker, size: float) -> _Grid:
+    """Return the grid of a checker, made anew unless it was the last to ask."""
+    whose, grid = _KEPT.get(size, (None, None))
+    if whose is None or grid is None or whose() is not checker:
+        grid = _Grid(checker, size)
+        _KEPT[size] = (weakref.ref(checker), grid)
+    return grid
+
+
+def _ahead(pose: Array, point: Array) -> Array:
+    """Return the point (2,) straight ahead of a pose, or behind it, that is nearest to a point (2,)."""
+    ahead = np.array([math.cos(pose[2]), math.sin(pose[2])])
+    return np.asarray(pose[:2] + ((point - pose[:2]) @ ahead) * ahead)
 
 
 class _Grid:
@@ -88,6 +127,7 @@ class _Grid:
 
     Attributes:
         size: of a cell [m].
+        bare: checks without a margin what the grid finds.
         headings: (H,) [rad], growing from 0.
         moves: (H, 2) rows and columns of one step forward.
         angles: (H,) from each heading to the next [rad].
@@ -95,22 +135,18 @@ class _Grid:
     """
 
     def __init__(self, checker: MotionChecker, size: float) -> None:
-        self.size = size
+        self.size, self.bare = size, checker.bare()
         self.headings, self.moves, self.angles = _compass()
         low_x, low_y, high_x, high_y = checker.floor.room.bounds
         self.origin = np.array([low_x, low_y])
         columns, rows = math.ceil((high_x - low_x) / size) + 1, math.ceil((high_y - low_y) / size) + 1
         x, y = np.meshgrid(low_x + size * np.arange(columns), low_y + size * np.arange(rows))
-        roomy = checker.floor.free.buffer(-checker.margin) if checker.margin > 0.0 else checker.floor.free
+        roomy = checker.floor.free.buffer(-max(checker.margin, HALF_DIAGONAL * size))
         shapely.prepare(roomy)
         blocked = ~shapely.contains_xy(roomy, x.ravel(), y.ravel()).reshape(rows, columns)
-        outline = checker.footprint.outline
-        self.free = np.stack([_clear(blocked, _mask(outline, (heading,), size)) for heading in self.headings])
-        between = [
-            tuple(heading + share * angle for share in np.linspace(0.0, 1.0, BETWEEN + 1))
-            for heading, angle in zip(self.headings, self.angles, strict=True)
-        ]
-        self.turns = np.stack([_clear(blocked, _mask(outline, headings, size)) for headings in between])
+        standing, turning = _masks(checker.footprint.outline.tobytes(), size)
+        self.free = np.stack([_clear(blocked, mask) for mask in standing])
+        self.turns = np.stack([_clear(blocked, mask) for mask in turning])
 
     def place(self, row: int, column: int) -> Array:
         """Return the point (2,) of a cell in `world` [m]."""
@@ -137,21 +173,33 @@ def _compass() -> tuple[Array, NDArray[np.int64], Array]:
     return headings, moves, np.mod(np.roll(headings, -1) - headings, 2.0 * math.pi)
 
 
-def _mask(outline: Array, headings: tuple[float, ...], size: float) -> NDArray[np.float32]:
+@lru_cache(maxsize=8)
+def _masks(corners: bytes, size: float) -> tuple[tuple[Cells, ...], tuple[Cells, ...]]:
+    """Return what an outline (k, 2), given as its bytes, covers at each heading, and in the turn to the next."""
+    outline = np.frombuffer(corners).reshape(-1, 2)
+    headings, _, angles = _compass()
+    standing = tuple(_mask(outline, (heading,), size) for heading in headings)
+    shares = np.linspace(0.0, 1.0, BETWEEN + 1)
+    turning = tuple(
+        _mask(outline, heading + shares * angle, size) for heading, angle in zip(headings, angles, strict=True)
+    )
+    return standing, turning
+
+
+def _mask(outline: Array, headings: Iterable[float], size: float) -> Cells:
     """Return the cells that an outline (k, 2) covers at some headings, the base's in the middle."""
     placed = [outline @ rotation(float(heading)).T for heading in headings]
     reach = math.ceil(max(float(np.abs(each).max()) for each in placed) / size)
     x, y = np.meshgrid(*(size * np.arange(-reach, reach + 1),) * 2)
     covered = shapely.union_all([Polygon(each) for each in placed])
-    return shapely.intersects_xy(covered, x.ravel(), y.ravel()).reshape(x.shape).astype(np.float32)
+    return shapely.intersects_xy(covered, x.ravel(), y.ravel()).reshape(x.shape).astype(np.uint8)
 
 
-def _clear(blocked: Flags, mask: NDArray[np.float32]) -> Flags:
+def _clear(blocked: Flags, mask: Cells) -> Flags:
     """Return where none of the cells under a mask is blocked; beyond the grid all are."""
     reach = mask.shape[0] // 2
-    wide = np.pad(blocked, reach, constant_values=True).astype(np.float32)
-    hit = cv2.filter2D(wide, cv2.CV_32F, mask)[reach:-reach, reach:-reach]
-    return np.asarray(hit < 0.5, dtype=np.bool_)
+    open_ = np.pad(~blocked, reach).astype(np.uint8)
+    return np.asarray(cv2.erode(open_, mask)[reach:-reach, reach:-reach] > 0, dtype=np.bool_)
 
 
 def _exits(grid: _Grid, bare: MotionChecker, pose: Array) -> tuple[States, list[float]]:
@@ -209,12 +257,18 @@ def _side(pose: Array, point: Array) -> bool:
 def _shortened(
     bare: MotionChecker, start: Array, goal: Array, corners: list[Array], backwards: list[bool]
 ) -> tuple[list[Array], list[bool]]:
-    """Return corners with those left out that can be, one after the other, as long as all turns and legs are free."""
+    """Return corners with those left out that can be, one after the other, as long as all turns and legs are free.
+
+    A leg of less than two cells, back from a pose to the middle of its cell, is no reason to drive to and fro.
+    """
     points, ways = list(corners), list(backwards)
     k = 1
     while k < len(points) - 1:
-        fewer, other = points[:k] + points[k + 1 :], [*ways[: k - 1], *ways[k:]]
-        if ways[k - 1] == ways[k] and _free(bare, _path((fewer, other), start, goal)):
+        before, after = (float(np.hypot(*(b - a))) for a, b in pairwise(points[k - 1 : k + 2]))
+        way = ways[k - 1] if before > after else ways[k]
+        fewer, other = points[:k] + points[k + 1 :], [*ways[: k - 1], way, *ways[k + 1 :]]
+        alike = ways[k - 1] == ways[k] or min(before, after) < 2.0 * CELLS[0]
+        if alike and _free(bare, _path((fewer, other), start, goal)):
             points, ways, k = fewer, other, max(k - 1, 1)
         else:
             k += 1
@@ -229,10 +283,6 @@ def _path(way: tuple[list[Array], list[bool]], start: Array, goal: Array) -> Bas
         if float(np.hypot(*(b - a))) > 1e-6
     ]
     return BasePath(start, goal, tuple(legs))
-
-
-def _if_free(bare: MotionChecker, path: BasePath) -> BasePath | None:
-    return path if _free(bare, path) else None
 
 
 def _free(bare: MotionChecker, path: BasePath) -> bool:

@@ -1,0 +1,128 @@
+"""Runs of the thesis's NAMO experiments (6.5.1, 6.5.2) in Bullet, and their rows."""
+
+from __future__ import annotations
+
+import statistics
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
+from pbrl_bringup.experiments.namo_figure import draw
+from pbrl_bringup.experiments.namo_rooms import Layout, draw_room
+from pbrl_bringup.namo_run import NamoOutcome, run_namo
+from pbrl_bringup.parallel import in_parallel
+
+RUNS, ENOUGH = 40, 38
+PLANNING = 2.0
+"""Sum over a run [s]."""
+PLANS, UPDATES, SURPRISES, PLANNED = (
+    "calls to the planner",
+    "calls to UpdateModel",
+    "surprises",
+    "overall planning time [s]",
+)
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the thesis says of an experiment, one run (figure 45).
+
+    Attributes:
+        runtime: [s].
+        planning: [s].
+        plans: calls to the planner.
+        updates: calls to UpdateModel.
+    """
+
+    runtime: float
+    planning: float
+    plans: int
+    updates: int
+
+
+def trial(seed: int, number: int, layout: Layout) -> NamoOutcome:
+    """Draw a room and let the robot find its way in it.
+
+    Args:
+        seed: of the experiment.
+        number: of the run.
+        layout: of the rooms.
+    """
+    rng = np.random.default_rng([seed, number])
+    scene, goal = draw_room(rng, layout)
+    return run_namo(scene, goal, int(rng.integers(2**31)))
+
+
+def measured(seed: int, quick: bool, out: Path, layout: Layout, thesis: Told) -> Measured:
+    """Run an experiment and draw its first run.
+
+    Args:
+        seed: of all runs.
+        quick: one run.
+        out: folder of the figure.
+        layout: of the rooms.
+        thesis: its numbers.
+    """
+    count = 1 if quick else RUNS
+    runs = in_parallel(trial, [(seed, k, layout) for k in range(count)], "rooms")
+    draw(next((run for run in runs if run.reached), runs[0]), out)
+    return Measured(rows_of(runs, thesis), {"runs": [told(run) for run in runs]})
+
+
+def rows_of(runs: Sequence[NamoOutcome], thesis: Told) -> list[Row]:
+    """Return the rows of an experiment."""
+    count = len(runs)
+    reached = [run for run in runs if run.reached]
+    failed = Counter(run.sentence for run in runs if not run.reached)
+    updates = [run.rows[UPDATES] for run in runs]
+    return [
+        at_least("runs that reach the goal", len(reached), f"of {count}", ENOUGH * count / RUNS, **failed),
+        at_most(
+            "planning time, sum over a run, largest",
+            max(run.rows[PLANNED] for run in runs),
+            "s",
+            PLANNING,
+            median=statistics.median(run.rows[PLANNED] for run in runs),
+            thesis=thesis.planning,
+        ),
+        at_most(
+            "model updates, median, off the thesis's",
+            abs(statistics.median(updates) - thesis.updates),
+            "1",
+            0.0,
+            median=statistics.median(updates),
+            surprises=statistics.median(run.rows[SURPRISES] for run in runs),
+            thesis=thesis.updates,
+        ),
+        at_most(
+            "runs in which updates and surprises differ",
+            sum(r.rows[UPDATES] != r.rows[SURPRISES] for r in runs),
+            "1",
+            0,
+        ),
+        at_most(
+            "run time, simulated, median",
+            statistics.median([run.seconds for run in reached] or [float("nan")]),
+            "s",
+            thesis.runtime,
+            thesis=thesis.runtime,
+            plans=statistics.median(run.rows[PLANS] for run in runs),
+            plans_thesis=thesis.plans,
+        ),
+        at_most(
+            "goal missed by, worst of those that reach it",
+            max([run.error for run in reached] or [float("nan")]),
+            "m",
+            0.1,
+        ),
+    ]
+
+
+def told(run: NamoOutcome) -> dict[str, Any]:
+    """Return a run for the report."""
+    return asdict(run)
