@@ -64,7 +64,7 @@ def plan_route(
         seed: of OMPL's generator, positive. The same seed gives the same path, unless the time limit is hit.
         time_limit: [s] of the sampling.
         narrow: the room is full: look at every place and heading of a grid first (see `grid_path`), and only then
-            at samples; otherwise only where samples find none.
+            at samples.
 
     Raises:
         ControlError: the seed or the time limit is not positive.
@@ -82,11 +82,7 @@ def plan_route(
         way = grid_path(checker, start, goal)
         if way is not None:
             return RouteResult(way)
-    sampled = _sampled(checker, start, goal, seed, time_limit)
-    if sampled.path is None and sampled.exhausted and not narrow:
-        way = grid_path(checker, start, goal)
-        return sampled if way is None else RouteResult(way)
-    return sampled
+    return _sampled(checker, start, goal, seed, time_limit)
 
 
 def _sampled(checker: MotionChecker, start: Array, goal: Array, seed: int, time_limit: float) -> RouteResult:
