@@ -145,6 +145,19 @@ def test_what_stays_in_the_way_of_a_turn_ends_it() -> None:
     )
 
 
+def test_a_turn_that_a_gap_has_just_room_for_is_made() -> None:
+    """A little further it would touch: that is never asked for, so it is nobody's concern."""
+    turn = BasePath(np.zeros(3), np.array([0.0, 0.0, -0.15]), ())
+    corner = KRANG_STOWED.at(turn.goal)[np.argmin(KRANG_STOWED.at(turn.goal)[:, 1])]
+    floor = FloorMap.of(ROOM, {"wall": box(-2.0, corner[1] - 0.3, 2.0, corner[1] - 0.002)})
+    beyond = MotionChecker(floor, KRANG_STOWED, 0.0).pose_fault(turn.goal - np.array([0.0, 0.0, 0.05]))
+    assert beyond == "'wall'"
+    base = Unicycle(np.zeros(3))
+    assert base.follow(PathTracker(turn, LIMITS, checker=MotionChecker(floor, KRANG_STOWED))).status is (
+        TrackStatus.ARRIVED
+    )
+
+
 def test_a_base_that_is_pushed_away_and_one_that_does_not_move_are_given_up() -> None:
     tracker, base = PathTracker(straight(), LIMITS), Unicycle(np.zeros(3))
     for _ in range(100):

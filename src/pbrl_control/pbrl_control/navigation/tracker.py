@@ -145,11 +145,13 @@ class PathTracker:
     def _current(self) -> Leg | None:
         return self._path.legs[self._leg] if self._leg < len(self._path.legs) else None
 
+    def _error(self, here: Array) -> float:
+        """Return how far the base has to turn to face as the path does, where it is on it [rad]."""
+        return wrap((self._current.heading if self._current else float(self._path.goal[2])) - float(here[2]))
+
     def _wish(self, here: Array) -> tuple[float, float]:
         """Return the velocities that the path asks for, going on to its next part where one is done."""
-        leg = self._current
-        heading = leg.heading if leg else float(self._path.goal[2])
-        error = wrap(heading - here[2])
+        leg, error = self._current, self._error(here)
         if self._driving and leg:
             left = float((leg.end - leg.start) @ (leg.end - here[:2])) / leg.length
             there = abs(left) <= self._settings.reached and abs(self._velocity[0]) <= SLOW
@@ -205,7 +207,8 @@ class PathTracker:
         if omega == 0.0:
             return ""
         stop = omega**2 / (2.0 * self._limits.yaw_acceleration) + self._settings.look_ahead
-        return self._checker.pose_fault(here + np.array([0.0, 0.0, math.copysign(stop, omega)]))
+        turn = math.copysign(min(stop, abs(self._error(here))), omega)  # in a narrow gap there is no room past it
+        return self._checker.pose_fault(here + np.array([0.0, 0.0, turn]))
 
     def _arrive(self, here: Array) -> None:
         """End, well or badly, when the base stands at the end of the path."""
