@@ -9,9 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pbrl_bringup.benches.namo_kinematic import REACHED, find_way, true_models
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments import namo_figure, namo_rooms, namo_static, namo_wheel
-from pbrl_bringup.experiments.namo_rooms import GOAL, LONG, SIZES, SQUARE, STUCK, TURNED, Layout, draw_room, outline_of
+from pbrl_bringup.experiments.namo_rooms import (
+    GOAL,
+    LONG,
+    MASSES,
+    SIZES,
+    SQUARE,
+    STUCK,
+    TURNED,
+    Layout,
+    draw_room,
+    outline_of,
+)
 from pbrl_bringup.experiments.namo_trials import PLANNED, PLANS, SURPRISES, UPDATES, rows_of, told
 from pbrl_bringup.namo_run import Moment, NamoOutcome
 from pbrl_namo.executive import State
@@ -56,9 +68,21 @@ def test_every_room_is_closed_and_conceals_what_it_was_told_to(layout: Layout, s
         assert tuple(casters) in layout.locked[name]
     poses = {name: np.array(scene.bodies[name].pose) for name in SIZES}
     start = np.array(scene.robot.pose)
-    assert namo_rooms._closed(layout, poses, start, goal)
+    assert namo_rooms.closed(namo_rooms.seen(layout, poses, start, goal))
     away = {name: np.array([x, y + 20.0, yaw]) for name, (x, y, yaw) in poses.items()}
-    assert not namo_rooms._closed(layout, away, start, goal)
+    assert not namo_rooms.closed(namo_rooms.seen(layout, away, start, goal))
+
+
+def test_in_a_room_of_surprises_every_locked_table_refuses_once_and_then_there_is_a_way() -> None:
+    rng = np.random.default_rng(6)
+    scene, goal = draw_room(rng, TURNED)
+    poses = {name: np.array(scene.bodies[name].pose) for name in SIZES}
+    known = namo_rooms.seen(TURNED, poses, np.array(scene.robot.pose), goal)
+    hidden = {
+        name: {"mass": MASSES[name], "locked_casters": told} for name, told in scene.concealed.locked_casters.items()
+    }
+    runs = [find_way(known, true_models(known, hidden), seed) for seed in range(6)]
+    assert any(run.end == REACHED and sorted(run.refused) == sorted(SIZES) for run in runs)
 
 
 def test_a_room_that_never_closes_is_refused_in_a_line() -> None:

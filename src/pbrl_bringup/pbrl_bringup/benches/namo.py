@@ -19,14 +19,14 @@ import shapely
 from pbrl_bringup.benches.namo_kinematic import REACHED, RIGHTLY, find_way, office_run, true_models
 from pbrl_bringup.benches.namo_rivals import duel
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
-from pbrl_bringup.experiments.namo_rooms import HEIGHT, MASSES, SIZES, STUCK, TURNED, draw_room, outline_of
+from pbrl_bringup.experiments.namo_rooms import SIZES, STUCK, TURNED, draw_room, seen
 from pbrl_bringup.parallel import in_parallel
 from pbrl_bringup.paths import workspace
 from pbrl_control.navigation.footprint import KRANG_STOWED
 from pbrl_namo.planner import NamoPlan, NamoSettings, plan, prior_beliefs
 from pbrl_namo.regions.free_space import free_space
 from pbrl_namo.regions.settings import MARGIN, RegionSettings
-from pbrl_namo.scene import Movable, NamoScene
+from pbrl_namo.scene import NamoScene
 from pbrl_namo.scenes import load_svg, random_office
 from pbrl_namo.scenes.hidden import nominal_mass
 
@@ -78,10 +78,8 @@ def thesis_rooms(seed: int, count: int) -> Measured:
         seconds, moves = [], 0
         for number in range(count):
             told, goal = draw_room(np.random.default_rng([seed, number]), layout)
-            movable: dict[str, Movable] = {each: Movable(outline_of(each), HEIGHT, MASSES[each]) for each in SIZES}
             poses = {each: np.array(told.bodies[each].pose) for each in SIZES}
-            scene = NamoScene.of(layout.room, {}, movable, poses, np.array(told.robot.pose), goal)
-            took, made = timed(scene, seed)
+            took, made = timed(seen(layout, poses, np.array(told.robot.pose), goal), seed)
             seconds.append(took)
             moves += made.chosen is not None
         rows.append(

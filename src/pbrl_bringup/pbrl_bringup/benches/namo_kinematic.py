@@ -64,6 +64,7 @@ class Run:
         reason: what the planner said last.
         moves: manipulations begun.
         failed: of those, how many the thing refused or something was in the way of.
+        refused: the things that refused, in order.
         planning: sum over all plans, prior beliefs apart [s].
         longest: the longest plan [s].
     """
@@ -74,6 +75,7 @@ class Run:
     failed: int
     planning: float
     longest: float
+    refused: tuple[str, ...] = ()
 
 
 def office_run(seed: int, number: int, count: int) -> Run:
@@ -103,18 +105,21 @@ def find_way(
     beliefs = prior_beliefs(scene, seed, settings)
     seconds: list[float] = []
     moves = failed = 0
+    unwilling: list[str] = []
     while moves < MOST * len(scene.movable):
         began = time.perf_counter()
         made = plan(scene, beliefs, seed + moves, settings)
         seconds.append(time.perf_counter() - began)
         if made.drive or made.chosen is None or made.chosen.plan is None:
-            return Run(_end(scene, made, truth), made.reason, moves, failed, sum(seconds), max(seconds))
+            end = _end(scene, made, truth)
+            return Run(end, made.reason, moves, failed, sum(seconds), max(seconds), tuple(unwilling))
         name = made.chosen.plan.object
         scene, refused, hit = carry_out(scene, made.chosen.plan, truth[name])
         moves, failed = moves + 1, failed + (refused or hit)
+        unwilling += [name] if refused else []
         if refused or hit:
             beliefs[name] = certain(truth[name])
-    return Run(LONG, "", moves, failed, sum(seconds), max(seconds, default=math.nan))
+    return Run(LONG, "", moves, failed, sum(seconds), max(seconds, default=math.nan), tuple(unwilling))
 
 
 def carry_out(scene: NamoScene, what: ManipulationPlan, model: ObjectModel) -> tuple[NamoScene, bool, bool]:

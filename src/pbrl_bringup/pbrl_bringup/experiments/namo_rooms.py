@@ -1,7 +1,9 @@
 """The thesis's room (figures 43, 44): two tables on casters stand between the robot and its goal, drawn from a seed.
 
 Some casters are locked, which only the simulator is told. Where everything stands and which casters they are is drawn;
-in every room neither table leaves a gap that the robot fits through.
+in every room neither table leaves a gap that the robot fits through. In the thesis's rooms the robot is surprised as
+often as the story goes. Where a layout says so, a room is one in which that happens to a planner in a kinematic world
+(`namo_kinematic`), which then, told the truth, finds a way: no more is asked of the rooms that are drawn.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 
 from bullet_sim.scene import Scene
 from bullet_sim.settings import parse_settings
+from pbrl_bringup.benches.namo_kinematic import REACHED, find_way, true_models
 from pbrl_bringup.errors import BringupError
 from pbrl_control.navigation.footprint import KRANG_STOWED
 from pbrl_namo.regions.free_space import drive_radius, free_space
@@ -48,11 +51,13 @@ class Layout:
         half_width: of the room [m].
         places: (x, y) of each table [m].
         locked: by table, the sets of casters of which one is drawn and locked.
+        surprises: whether who plans without knowing of them meets the constraints of all those tables.
     """
 
     half_width: float
     places: Mapping[str, tuple[float, float]]
     locked: Mapping[str, Sequence[tuple[str, ...]]]
+    surprises: bool = False
 
     @property
     def room(self) -> Array:
@@ -63,7 +68,7 @@ class Layout:
 
 STUCK = Layout(2.325, {SQUARE: (2.6, 0.925), LONG: (2.6, -1.275)}, {SQUARE: ANY_TWO})
 """Of 6.5.1: to move the square table seems best, and it is stuck."""
-TURNED = Layout(2.4, {SQUARE: (2.6, 1.5), LONG: (2.6, -0.7)}, {SQUARE: ANY_TWO, LONG: ONE_NEAR})
+TURNED = Layout(2.45, {SQUARE: (2.6, 1.05), LONG: (2.6, -1.15)}, {SQUARE: ANY_TWO, LONG: ONE_NEAR}, surprises=True)
 """Of 6.5.2: the square table is stuck, the long one has room to turn about a locked caster."""
 
 
@@ -87,11 +92,14 @@ def draw_room(rng: np.random.Generator, layout: Layout) -> tuple[Scene, Array]:
         }
         start = np.array([rng.uniform(-0.5, 0.4), rng.uniform(-0.9, 0.9), rng.uniform(-math.pi, math.pi)])
         goal = np.array([GOAL[0] + rng.uniform(-0.3, 0.3), GOAL[1] + rng.uniform(-0.8, 0.8), math.nan])
-        if _closed(layout, poses, start, goal):
+        scene = seen(layout, poses, start, goal)
+        if not closed(scene):
+            continue
+        concealed = {name: list(sets[int(rng.integers(len(sets)))]) for name, sets in layout.locked.items()}
+        if not layout.surprises or _surprising(scene, concealed, int(rng.integers(2**31))):
             break
     else:
         raise BringupError(f"room: expected one of {DRAWS} draws to be closed by its tables, none was")
-    concealed = {name: list(sets[int(rng.integers(len(sets)))]) for name, sets in layout.locked.items()}
     bodies: dict[str, Any] = {
         name: {
             "kind": "office_table",
@@ -118,10 +126,28 @@ def outline_of(name: str) -> Array:
     return 0.5 * np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
 
 
-def _closed(layout: Layout, poses: dict[str, Array], start: Array, goal: Array) -> bool:
-    """Tell whether start and goal are in different regions, and the robot stands free."""
+def seen(layout: Layout, poses: dict[str, Array], start: Array, goal: Array) -> NamoScene:
+    """Return what can be seen of a room.
+
+    Args:
+        layout: of it.
+        poses: (3,) of each table in `world` [m, rad].
+        start: (3,) of the base.
+        goal: (3,) of it; a heading of NaN: any.
+    """
     movable = {name: Movable(outline_of(name), HEIGHT, MASSES[name]) for name in SIZES}
-    scene = NamoScene.of(layout.room, {}, movable, poses, start, goal)
+    return NamoScene.of(layout.room, {}, movable, poses, start, goal)
+
+
+def closed(scene: NamoScene) -> bool:
+    """Tell whether start and goal are in different regions, and the robot stands free."""
     free = free_space(scene, drive_radius(KRANG_STOWED))
-    here, there = free.index(start), free.index(goal)
+    here, there = free.index(scene.start), free.index(scene.goal)
     return here is not None and there is not None and here != there
+
+
+def _surprising(scene: NamoScene, locked: Mapping[str, Sequence[str]], seed: int) -> bool:
+    """Tell whether each table with locked casters refuses once in a kinematic world, and then a way is found."""
+    hidden = {name: {"mass": MASSES[name], "locked_casters": locked.get(name, ())} for name in scene.movable}
+    run = find_way(scene, true_models(scene, hidden), seed)
+    return run.end == REACHED and sorted(run.refused) == sorted(locked)
