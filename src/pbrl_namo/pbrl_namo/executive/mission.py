@@ -197,7 +197,17 @@ class Mission:
     def _draw(self) -> int:
         """Return the seed of the next job, above zero: the same ones in the same order for the same seed."""
         self._drawn += 1
-        return int(np.random.SeedSequence([self._seed, self._drawn]).generate_state(1)[0] % (2**31 - 1)) + 1
+        return job_seed(self._seed, self._drawn)
+
+
+def job_seed(seed: int, number: int) -> int:
+    """Return the seed of a mission's job, above zero.
+
+    Args:
+        seed: of the mission.
+        number: of the job, from 1 on; the first one is a plan.
+    """
+    return int(np.random.SeedSequence([seed, number]).generate_state(1)[0] % (2**31 - 1)) + 1
 
 
 def checked_goal(goal: Array) -> Array:

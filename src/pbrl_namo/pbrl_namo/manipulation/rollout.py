@@ -12,6 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from pbrl_control.planar import Array, rotation
+from pbrl_namo.beliefs.stops import reach
 from pbrl_namo.manipulation.body import Body, circle_around
 from pbrl_namo.manipulation.grasps import Grasp
 from pbrl_namo.manipulation.opening_kernel import draw_track
@@ -164,7 +165,7 @@ class Roller:
         hulls = np.vstack(outlines)
         held = [self.grasps[g] for g in chosen]
         left = (1.0 - used) / np.maximum(aside(twists, held, motion), NO_LIMIT)
-        ends = np.where(np.abs(twists[:, 2]) > TURNS, motion.turn, motion.way)
+        ends = reach(body.stops, pose, twists, np.where(np.abs(twists[:, 2]) > TURNS, motion.turn, motion.way))
         limits = np.where(usable & [way is not None for way in ways], np.minimum(left, ends[:, None]), 0.0)
         lines = [np.zeros((1, 2)) if way is None else way for way in ways]
         went, causes, hits = np.zeros(limits.shape), *(np.full(limits.shape, -1, dtype=np.int64) for _ in range(2))

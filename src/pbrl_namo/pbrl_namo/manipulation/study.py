@@ -64,4 +64,6 @@ class Study:
                 f"belief of {name!r}: expected one of the outline in the scene, got one of another; make it anew"
             )
         worlds = Worlds.sample(beliefs[name], scene.poses[name], rng, settings.worlds, settings.constraints)
-        return cls(Body.of(footprint), worlds, Commands.of(worlds, settings), scene, name, settings)
+        return cls(
+            Body.of(footprint, beliefs[name].stops), worlds, Commands.of(worlds, settings), scene, name, settings
+        )
