@@ -1,4 +1,4 @@
-"""Rooms that conceal something: met on the way of what looks best, with another way left; rows from runs made by hand."""
+"""Rooms that conceal something: it is met on the way of what looks best, another way is left; rows by hand."""
 
 from __future__ import annotations
 
