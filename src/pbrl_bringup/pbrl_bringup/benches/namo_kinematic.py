@@ -102,14 +102,16 @@ def find_way(
     """
     beliefs = prior_beliefs(scene, seed, settings)
     seconds: list[float] = []
+    been: dict[str, list[Array]] = {}
     moves = failed = 0
     while moves < MOST * len(scene.movable):
         began = time.perf_counter()
-        made = plan(scene, beliefs, seed + moves, settings)
+        made = plan(scene, beliefs, seed + moves, settings, been)
         seconds.append(time.perf_counter() - began)
         if made.drive or made.chosen is None or made.chosen.plan is None:
             return Run(_end(scene, made, truth), made.reason, moves, failed, sum(seconds), max(seconds))
         name = made.chosen.plan.object
+        been.setdefault(name, []).append(np.array(scene.poses[name]))
         scene, refused, hit = carry_out(scene, made.chosen.plan, truth[name])
         moves, failed = moves + 1, failed + (refused or hit)
         if refused or hit:
