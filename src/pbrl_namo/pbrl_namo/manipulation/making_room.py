@@ -162,7 +162,7 @@ class RoomMaker:
         made = estimate_of(moved, found, self._study(first), target, self._settings) if found else None
         if made is None or made.plan is None:
             return None
-        return replace(made, plan=replace(made.plan, more=made.plan.more + len(rest) + len(steps)))
+        return replace(made, plan=replace(made.plan, more=made.plan.more + len(rest) + len(steps), aside=True))
 
     def _floor(self, gone: Collection[str]) -> shapely.Geometry:
         """Return where the disc can be with some things gone."""
