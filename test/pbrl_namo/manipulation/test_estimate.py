@@ -200,6 +200,7 @@ def test_what_cannot_be_grasped_opens_nothing() -> None:
     scene = two_tables()
     free, roadmap = free_space(scene), build_roadmap(scene, np.random.default_rng(0))
     none = type(roadmap)(**{**roadmap.__dict__, "grasps": dict.fromkeys(roadmap.grasps, ())})
-    found = estimate(scene, free, none, Opening(0, 1, "long"), surely(scene), np.random.default_rng(0), QUICK)
+    once = QUICK.model_copy(update={"steps": 1})
+    found = estimate(scene, free, none, Opening(0, 1, "long"), surely(scene), np.random.default_rng(0), once)
     assert found.probability == 0.0
     assert "no grasp" in found.reason
