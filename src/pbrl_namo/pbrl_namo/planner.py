@@ -114,7 +114,11 @@ def prior_beliefs(scene: NamoScene, seed: int, settings: NamoSettings | None = N
 
 
 def plan(
-    scene: NamoScene, beliefs: Mapping[str, ObjectBelief], seed: int, settings: NamoSettings | None = None
+    scene: NamoScene,
+    beliefs: Mapping[str, ObjectBelief],
+    seed: int,
+    settings: NamoSettings | None = None,
+    been: Mapping[str, Sequence[Array]] | None = None,
 ) -> NamoPlan:
     """Plan what to move next; same seed, same plan.
 
@@ -123,6 +127,8 @@ def plan(
         beliefs: of everything movable that may have to be moved.
         seed: of the roadmap and the sampled worlds.
         settings: of everything.
+        been: poses (3,) in `world`, by name, from which things were moved on the way to this goal: where a thing is
+            moved in steps, or out of the way, it is not brought back there, so that this comes to an end [m, rad].
 
     Raises:
         NamoError: nothing is believed of a thing that could be moved, or a belief is not of it.
@@ -142,7 +148,7 @@ def plan(
     roadmap = clock("roadmap", lambda: build_roadmap(scene, np.random.default_rng([seed, 0]), settings.regions))
     found = clock("openings", lambda: _left(scene, free, openings(scene, free, roadmap)))
     away = cut_off(free, found, start)
-    maker = _Maker(scene, free, roadmap, beliefs, seed, settings.manipulation, clock)
+    maker = _Maker(scene, free, roadmap, beliefs, seed, settings.manipulation, clock, been or {})
     if goal in away:
         made_room = maker.make_room(start, goal)
         if made_room is not None:
@@ -208,7 +214,9 @@ class _Maker:
         seed: int,
         settings: ManipulationSettings,
         clock: _Clock,
+        been: Mapping[str, Sequence[Array]],
     ) -> None:
+        self._been = been
         self._scene, self._free, self._roadmap, self._beliefs = scene, free, roadmap, beliefs
         self._seed, self._settings, self._clock = seed, settings, clock
         self._names = list(scene.movable)
@@ -222,7 +230,15 @@ class _Maker:
             self.study(name)
         return self._clock(
             "manipulation",
-            lambda: estimate_prepared(yard, self._free, self._roadmap, opening, self._studies, self._settings),
+            lambda: estimate_prepared(
+                yard,
+                self._free,
+                self._roadmap,
+                opening,
+                self._studies,
+                self._settings,
+                self._been.get(opening.object, ()),
+            ),
         )
 
     @property
@@ -246,7 +262,7 @@ class _Maker:
 
     def _make_room(self, start: int, goal: int) -> Estimate | None:
         found = closers(self._scene, self._free, start, goal)
-        rooms = RoomMaker(self.yard, self._free, self._roadmap, self.study, self._settings)
+        rooms = RoomMaker(self.yard, self._free, self._roadmap, self.study, self._settings, self._been)
         return rooms.find(found, self._scene.goal[:2])
 
     def _prepare(self) -> Yard:

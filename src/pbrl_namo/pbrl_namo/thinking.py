@@ -107,11 +107,11 @@ class Thoughts:
         begun = time.perf_counter()
         beliefs, way = _beliefs(job, self._settings), None
         settings = self._settings
-        first = found = plan(job.scene, beliefs, job.seed, settings)
+        first = found = plan(job.scene, beliefs, job.seed, settings, job.been)
         for wider in WIDER:
             if wider > 0.0:
                 settings = _wider(job.scene, settings, wider)
-                found = plan(job.scene, beliefs, job.seed, settings)
+                found = plan(job.scene, beliefs, job.seed, settings, job.been)
             if not found.drive:
                 break
             # A disc that gets through says nothing of the turns that a longer robot has to make on its way.
@@ -123,7 +123,7 @@ class Thoughts:
         chosen, move = None if way is not None else found.chosen, None
         if chosen is not None and chosen.plan is not None:
             opening = chosen.opening
-            targets = _targets(found, chosen.plan, opening.end)
+            targets = np.zeros((0, 2)) if chosen.plan.aside else _targets(found, chosen.plan, opening.end)
             move = _move(chosen.plan, opening.start, opening.end, targets, opening.then)
         return PlanAnswer(
             move,
@@ -245,6 +245,7 @@ def _move(found: ManipulationPlan, start: int, end: int, targets: Array, then: t
         replace(found.model, casters=_casters(np.asarray(found.model.footprint))),
         str(found.model_class),
         hands=found.sides,
+        more=found.more,
     )
 
 

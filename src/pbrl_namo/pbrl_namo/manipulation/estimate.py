@@ -10,7 +10,7 @@ each command is followed once with each grasp; what it takes of the grips is the
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -76,6 +76,7 @@ def estimate_prepared(
     opening: Opening,
     studies: Mapping[str, Study],
     settings: ManipulationSettings,
+    been: Sequence[Array] = (),
 ) -> Estimate:
     """Estimate one opening.
 
@@ -86,6 +87,7 @@ def estimate_prepared(
         opening: one of theirs.
         studies: of the opening's object, and of those that have to go after it.
         settings: of Monte-Carlo manipulation.
+        been: poses (3,) of the object to which it is not brought back in steps [m, rad].
     """
     study, name = studies[opening.object], opening.object
     hopeless = Estimate(opening, 0.0, -settings.cost.alpha, None)
@@ -94,7 +96,7 @@ def estimate_prepared(
     target = target_point(yard.scene, free, roadmap, opening)
     found, works = _in_one_grasp(yard, roadmap, opening, study, target, settings)
     if settings.steps > 1 and not works[study.worlds.usual()].any():
-        several = estimate_in_steps(yard, free, opening, study, target, settings)
+        several = estimate_in_steps(yard, free, opening, study, target, settings, been)
         if several is not None and _worth(several, settings) > _worth(found, settings):
             found = several
     if found.plan is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +27,13 @@ Flags = NDArray[np.bool_]
 
 
 def estimate_in_steps(
-    yard: Yard, free: FreeSpace, opening: Opening, study: Study, target: Array, settings: ManipulationSettings
+    yard: Yard,
+    free: FreeSpace,
+    opening: Opening,
+    study: Study,
+    target: Array,
+    settings: ManipulationSettings,
+    been: Sequence[Array] = (),
 ) -> Estimate | None:
     """Return what is expected of an opening in steps that suit what its thing most likely is; None where none do.
 
@@ -37,9 +44,10 @@ def estimate_in_steps(
         study: of the opening's object.
         target: (2,) in `world`, to which a way is to be open [m].
         settings: of Monte-Carlo manipulation.
+        been: poses (3,) to which the thing is not brought back [m, rad].
     """
     aim = OpenWay(yard.scene.movable[opening.object], target, yard.scene.goal[None, :2], free.radius)
-    steps = StepSearch(yard, free, opening, study, aim, settings).find()
+    steps = StepSearch(yard, free, opening, study, aim, settings, been).find()
     return estimate_of(opening, steps, study, target, settings) if steps else None
 
 

@@ -9,7 +9,8 @@ Each time there is one thing less in the way, until the opening can be made.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from pbrl_namo.manipulation.in_steps import estimate_of
 from pbrl_namo.manipulation.plan import Estimate
 from pbrl_namo.manipulation.settings import ManipulationSettings
 from pbrl_namo.manipulation.stances import leave_point
-from pbrl_namo.manipulation.steps import Step, StepSearch
+from pbrl_namo.manipulation.steps import SAME_PLACE, SAME_TURN, Step, StepSearch
 from pbrl_namo.manipulation.study import Study
 from pbrl_namo.manipulation.yard import Yard
 from pbrl_namo.regions.free_space import ARC, FreeSpace, free_space
@@ -48,6 +49,7 @@ class RoomMaker:
         roadmap: over it.
         study: makes a thing ready.
         settings: of Monte-Carlo manipulation.
+        been: poses (3,) by name, to which things are not brought back [m, rad].
     """
 
     def __init__(
@@ -57,7 +59,9 @@ class RoomMaker:
         roadmap: Roadmap,
         study: Callable[[str], Study],
         settings: ManipulationSettings,
+        been: Mapping[str, Sequence[Array]],
     ) -> None:
+        self._been = been
         self._yard, self._free, self._roadmap, self._study = yard, free, roadmap, study
         self._settings, self._scene = settings, yard.scene
 
@@ -120,7 +124,7 @@ class RoomMaker:
         then = tuple(other for other in opening.then if other not in gone)
         aim = OpenWay(scene.movable[name], target, scene.goal[None, :2], free.radius)
         asked = Opening(start, start, name, then)
-        return StepSearch(yard, free, asked, self._study(name), aim, self._settings).find()
+        return StepSearch(yard, free, asked, self._study(name), aim, self._settings, self._been.get(name, ())).find()
 
     def _away(
         self,
@@ -137,7 +141,11 @@ class RoomMaker:
         floor = self._floor([opening.object, first, *rest])
         through = self._floor([opening.object, first, *rest, *opening.then])
 
+        before = self._been.get(first, ())
+
         def good(step: Step) -> bool:
+            if any(_near(step.end, pose) for pose in before):
+                return False
             put, here = thing.at(step.end).buffer(radius, quad_segs=ARC), step.leave
             for later in steps:
                 left = floor.difference(shapely.union(put, mover.at(later.pose).buffer(radius, quad_segs=ARC)))
@@ -149,11 +157,12 @@ class RoomMaker:
 
         aim = OutOfTheWay(thing, area, scene.goal[None, :2], radius, good)
         moved = Opening(opening.start, opening.end, first, tuple(dict.fromkeys((*rest, opening.object, *opening.then))))
-        found = StepSearch(self._yard, self._free, moved, self._study(first), aim, self._settings).find()
+        search = StepSearch(self._yard, self._free, moved, self._study(first), aim, self._settings, before)
+        found = search.find()
         made = estimate_of(moved, found, self._study(first), target, self._settings) if found else None
         if made is None or made.plan is None:
             return None
-        return replace(made, plan=replace(made.plan, more=made.plan.more + len(rest) + len(steps)))
+        return replace(made, plan=replace(made.plan, more=made.plan.more + len(rest) + len(steps), aside=True))
 
     def _floor(self, gone: Collection[str]) -> shapely.Geometry:
         """Return where the disc can be with some things gone."""
@@ -180,6 +189,12 @@ def _taken(scene: NamoScene, name: str, steps: Sequence[Step]) -> shapely.Geomet
 def _without(scene: NamoScene, gone: Collection[str]) -> NamoScene:
     left = {name: thing for name, thing in scene.movable.items() if name not in gone}
     return replace(scene, movable=left, poses={name: scene.poses[name] for name in left})
+
+
+def _near(a: Array, b: Array) -> bool:
+    """Say whether two poses (3,) of a thing are much the same."""
+    turned = abs(math.remainder(float(a[2] - b[2]), math.tau))
+    return bool(np.hypot(*(a[:2] - b[:2])) < SAME_PLACE and turned < SAME_TURN)
 
 
 def _joined(floor: shapely.Geometry, a: Array, b: Array) -> bool:

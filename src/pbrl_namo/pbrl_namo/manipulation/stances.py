@@ -112,6 +112,10 @@ class Stances:
         )
         return inside & ~met.reshape(-1, 2).any(axis=1)
 
+    def free_ones(self, pose: Array, region: shapely.Polygon, pieces: Pieces) -> tuple[Grasp, ...]:
+        """Return the grasps that `free` says."""
+        return self.taken(np.flatnonzero(self.free(pose, region, pieces)).tolist())
+
     def taken(self, chosen: Sequence[int]) -> tuple[Grasp, ...]:
         """Return some of the grasps."""
         return tuple(self.grasps[k] for k in chosen)

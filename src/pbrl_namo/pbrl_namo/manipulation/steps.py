@@ -9,7 +9,6 @@ to go on from. What is wanted is an `Aim`: an opening, or that the thing is out 
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,7 +38,10 @@ Flags = NDArray[np.bool_]
 SHORT = 0.05
 """Share of a unit, m or rad, below which a motion is none."""
 SAME_PLACE, SAME_TURN = 0.12, 0.15
-"""[m], [rad] between two poses that are looked at as one."""
+"""[m], [rad] between two poses that are looked at as one; of what can only turn a third of it."""
+FINER = 3.0
+LEVER = 0.5
+"""[m] of a way that a turn of 1 rad counts as."""
 DEEPER = 0.2
 """[m] of a way covered that a further step counts as."""
 
@@ -157,10 +159,11 @@ class Aim(Protocol):
 
 @dataclass(frozen=True)
 class Place:
-    """A pose of the thing that can be come to, and how."""
+    """A pose of the thing that can be come to, how, and how far from what is wanted it is [m]."""
 
     pose: Array
     steps: tuple[Step, ...]
+    far: float
 
 
 class StepSearch:
@@ -173,10 +176,18 @@ class StepSearch:
         study: of its object; the typical one of its worlds is looked at.
         aim: what is wanted.
         settings: budgets, motion.
+        been: poses (3,) of the thing at which it has been let go already: it is not brought back there [m, rad].
     """
 
     def __init__(
-        self, yard: Yard, free: FreeSpace, opening: Opening, study: Study, aim: Aim, settings: ManipulationSettings
+        self,
+        yard: Yard,
+        free: FreeSpace,
+        opening: Opening,
+        study: Study,
+        aim: Aim,
+        settings: ManipulationSettings,
+        been: Sequence[Array] = (),
     ) -> None:
         self._yard, self._free, self._opening, self._body = yard, free, opening, study.body
         self._stances, self._aim, self._settings = study.stances, aim, settings
@@ -192,29 +203,40 @@ class StepSearch:
             self._field = yard.grid.field(yard.owned((name, *opening.then)), aim.target)
             self._roller = self._roller.looking(aim.target)
         self._line: shapely.LineString | None = None
-        self._seen: set[tuple[int, ...]] = set()
+        self._turns = self._freedom.model_class == ModelClass.FIXED_POINT
+        self._finer = FINER if self._turns else 1.0
+        self._seen = {self._key(pose) for pose in (yard.scene.poses[name], *been)}
 
     def find(self) -> tuple[Step, ...]:
         """Return the steps; empty where none were found within the budget."""
         if self._aim.target is not None and self._field is None:
             return ()
-        start = np.array(self._yard.scene.poses[self._opening.object], dtype=float)
-        waiting: list[tuple[float, int, Place]] = [(0.0, 0, Place(start, ()))]
-        count = 0
-        self._seen = {_key(start)}
+        waiting = [Place(np.array(self._yard.scene.poses[self._opening.object], dtype=float), (), 0.0)]
+        gone_on: list[Array] = []
         for _ in range(self._settings.step_places):
             if not waiting:
                 break
-            place = heapq.heappop(waiting)[2]
+            place = waiting.pop(self._next(waiting, gone_on))
+            gone_on.append(place.pose)
             last, tries = self._from(place)
             if last is not None:
                 return (*place.steps, last)
-            if len(place.steps) + 1 < self._settings.steps:
-                for far, step in self._worth(tries) if tries is not None else ():
-                    count += 1
-                    score = far + DEEPER * (len(place.steps) + 1)
-                    heapq.heappush(waiting, (score, count, Place(step.end, (*place.steps, step))))
+            if tries is not None and len(place.steps) + 1 < self._settings.steps:
+                waiting += [Place(step.end, (*place.steps, step), far) for far, step in self._worth(tries)]
         return ()
+
+    def _next(self, waiting: list[Place], gone_on: list[Array]) -> int:
+        """Return which place to go on from: near to what is wanted, few steps away, unlike those it was gone on from.
+
+        Of what can only turn, how far it is from what is wanted says little: it may have to turn the other way round.
+        """
+        if not gone_on:
+            return 0
+        apart = np.array([place.pose for place in waiting])[:, None] - np.array(gone_on)
+        away = np.hypot(apart[..., 0], apart[..., 1]) + LEVER * np.abs(apart[..., 2])
+        far = np.array([0.0 if self._turns else place.far for place in waiting])
+        deep = np.array([DEEPER * len(place.steps) for place in waiting])
+        return int(np.argmin(far + deep - away.min(axis=1)))
 
     def _from(self, place: Place) -> tuple[Step | None, Tries | None]:
         """Return the step from a place that gets to what is wanted, or everything that leads somewhere."""
@@ -270,7 +292,7 @@ class StepSearch:
         parts = tries.shared(self._settings.stops)
         poses, new = parts.ends(), []
         for k, pose in enumerate(poses):
-            key = _key(pose)
+            key = self._key(pose)
             if key not in self._seen:
                 self._seen.add(key)
                 new.append(k)
@@ -279,8 +301,7 @@ class StepSearch:
         far = self._aim.far(poses[new], self._line)
         return [(float(away), parts.step(k)) for away, k in zip(far, new, strict=True) if np.isfinite(away)]
 
-
-def _key(pose: Array) -> tuple[int, ...]:
-    """Return a box that a pose (3,) is in; poses in one are looked at as one."""
-    x, y, turn = pose.tolist()
-    return round(x / SAME_PLACE), round(y / SAME_PLACE), round(math.remainder(turn, math.tau) / SAME_TURN)
+    def _key(self, pose: Array) -> tuple[int, ...]:
+        """Return a box that a pose (3,) is in; poses in one are looked at as one."""
+        x, y, turn = (self._finer * pose).tolist()
+        return round(x / SAME_PLACE), round(y / SAME_PLACE), round(turn / SAME_TURN)
