@@ -17,6 +17,8 @@ import numpy as np
 from pbrl_bringup.benches.rows import Measured, Row, at_least
 from pbrl_bringup.experiments.namo_concealed_rooms import KINDS, Concealing, draw_concealing
 from pbrl_bringup.experiments.namo_figure import draw
+from pbrl_bringup.experiments.namo_kept import kept_run
+from pbrl_bringup.experiments.namo_trials import RUNS_KEPT
 from pbrl_bringup.namo_run import NamoOutcome, run_namo
 from pbrl_bringup.parallel import in_parallel
 from pbrl_namo.executive.settings import ExecutiveSettings
@@ -53,16 +55,25 @@ def room_of(seed: int, number: int) -> Concealing:
     return draw_concealing(np.random.default_rng([seed, number]), KINDS[number % len(KINDS)])
 
 
-def trial(seed: int, number: int, ask: bool) -> NamoOutcome:
-    """Let the robot find its way in a room.
+def trial(seed: int, number: int, ask: bool, folder: Path) -> NamoOutcome:
+    """Let the robot find its way in a room, unless that is done already.
 
     Args:
         seed: of the experiment.
         number: of the room.
         ask: whether it asks what it met.
+        folder: where runs are kept.
+
+    Raises:
+        BringupError: a run of another seed is kept there.
     """
-    room = room_of(seed, number)
-    return run_namo(room.scene, room.goal, room.seed, ExecutiveSettings(ask_mismatch=ask), longest=LONGEST)
+
+    def run() -> NamoOutcome:
+        room = room_of(seed, number)
+        return run_namo(room.scene, room.goal, room.seed, ExecutiveSettings(ask_mismatch=ask), longest=LONGEST)
+
+    who = "asked" if ask else "plain"
+    return kept_run(folder / f"{number:02d}_{who}.json", {"seed": seed, "number": number, "ask": ask}, run)
 
 
 def measure(seed: int, quick: bool, out: Path) -> Measured:
@@ -74,7 +85,8 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
         out: folder of the figures.
     """
     count = len(KINDS) if quick else ROOMS
-    runs = in_parallel(trial, [(seed, k, ask) for k in range(count) for ask in (True, False)], "runs")
+    told = [(seed, k, ask, out / RUNS_KEPT) for k in range(count) for ask in (True, False)]
+    runs = in_parallel(trial, told, "runs")
     pairs = [Pair(KINDS[k % len(KINDS)], runs[2 * k], runs[2 * k + 1]) for k in range(count)]
     shown = next((k for k, pair in enumerate(pairs) if pair.asked.reached and not pair.plain.reached), 0)
     concealed = room_of(seed, shown).outlines()

@@ -13,11 +13,14 @@ import numpy as np
 
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.experiments.namo_figure import draw
+from pbrl_bringup.experiments.namo_kept import kept_run
 from pbrl_bringup.experiments.namo_rooms import Layout, draw_room
 from pbrl_bringup.namo_run import NamoOutcome, run_namo
 from pbrl_bringup.parallel import in_parallel
 
 RUNS, ENOUGH = 40, 38
+RUNS_KEPT = "runs"
+"""Folder below an experiment's own: what was stopped goes on with what is in it."""
 PLANNING = 2.0
 """Sum over a run [s]."""
 PLANS, UPDATES, SURPRISES, PLANNED = (
@@ -45,17 +48,26 @@ class Told:
     updates: int
 
 
-def trial(seed: int, number: int, layout: Layout) -> NamoOutcome:
-    """Draw a room and let the robot find its way in it.
+def trial(seed: int, number: int, layout: Layout, folder: Path) -> NamoOutcome:
+    """Draw a room and let the robot find its way in it, unless that is done already.
 
     Args:
         seed: of the experiment.
         number: of the run.
         layout: of the rooms.
+        folder: where runs are kept.
+
+    Raises:
+        BringupError: a run of another seed or layout is kept there.
     """
-    rng = np.random.default_rng([seed, number])
-    scene, goal = draw_room(rng, layout)
-    return run_namo(scene, goal, int(rng.integers(2**31)))
+
+    def run() -> NamoOutcome:
+        rng = np.random.default_rng([seed, number])
+        scene, goal = draw_room(rng, layout)
+        return run_namo(scene, goal, int(rng.integers(2**31)))
+
+    told = {"seed": seed, "number": number, "half_width": layout.half_width, "surprises": layout.surprises}
+    return kept_run(folder / f"{number:02d}.json", told, run)
 
 
 def measured(seed: int, quick: bool, out: Path, layout: Layout, thesis: Told) -> Measured:
@@ -69,7 +81,7 @@ def measured(seed: int, quick: bool, out: Path, layout: Layout, thesis: Told) ->
         thesis: its numbers.
     """
     count = 1 if quick else RUNS
-    runs = in_parallel(trial, [(seed, k, layout) for k in range(count)], "rooms")
+    runs = in_parallel(trial, [(seed, k, layout, out / RUNS_KEPT) for k in range(count)], "rooms")
     draw(next((run for run in runs if run.reached), runs[0]), out)
     return Measured(rows_of(runs, thesis), {"runs": [told(run) for run in runs]})
 
