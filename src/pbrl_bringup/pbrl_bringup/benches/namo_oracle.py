@@ -129,10 +129,11 @@ class Proof:
         turn = Turn(bare, free, name, self._freedoms[name].moves[0])
         pieces, roller = self._prepared(bare, name)
         stances = self._grasps(name)
-        first = 0, turn.side(0, bare.start[:2])
-        if first[1] is None:
+        begun = turn.side(0, bare.start[:2])
+        if begun is None:
             return True  # the robot stands where the disc has no room: nothing is proved
-        waiting, seen = [first], {first}
+        waiting = [(0, begun)]
+        seen = set(waiting)
         while waiting:
             k, side = waiting.pop()
             grasps = stances.free_ones(turn.pose(k), turn.parts(k)[side], pieces)

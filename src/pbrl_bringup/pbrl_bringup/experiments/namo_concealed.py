@@ -85,8 +85,8 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
         out: folder of the figures.
     """
     count = len(KINDS) if quick else ROOMS
-    told = [(seed, k, ask, out / RUNS_KEPT) for k in range(count) for ask in (True, False)]
-    runs = in_parallel(trial, told, "runs")
+    trials = [(seed, k, ask, out / RUNS_KEPT) for k in range(count) for ask in (True, False)]
+    runs = in_parallel(trial, trials, "runs")
     pairs = [Pair(KINDS[k % len(KINDS)], runs[2 * k], runs[2 * k + 1]) for k in range(count)]
     shown = next((k for k, pair in enumerate(pairs) if pair.asked.reached and not pair.plain.reached), 0)
     concealed = room_of(seed, shown).outlines()

@@ -139,7 +139,7 @@ def _in_one_grasp(
     rewards = reward(taken[..., TIME], taken[..., FORCE], taken[..., TORQUE], settings.cost)
     best = np.where(works, rewards, hopeless.reward).max(axis=1)
     plan = best_plan(grasps, roller.pose, name, target, study.worlds, ways, taken, rewards, works, settings)
-    possible: Flags = works.any(axis=1)
+    possible: Flags = np.asarray(works.any(axis=1))
     return Estimate(opening, float(possible.mean()), float(best.mean()), plan), possible
 
 

@@ -87,7 +87,7 @@ class Roller:
         self._hold(grasps)
         self._ways: list[Array | None] = [np.zeros((1, 2)) for _ in grasps]
         if target is not None:
-            self._ways = reference_ways(yard, opening, target, self.leaves)
+            self._ways = reference_ways(yard, opening, target, list(self.leaves))
         reach = float(np.hypot(*np.vstack((body.points, *self._outlines)).T).max()) if len(grasps) else math.inf
         near = _nearby(yard, opening, self.pose, 2.0 * settings.motion.way + reach)
         self._pieces, self._clusters = yard.pieces.taken(near), yard.clusters((opening.object, *opening.then))[near]

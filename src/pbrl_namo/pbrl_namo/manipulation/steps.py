@@ -104,7 +104,7 @@ class Tries:
     def __len__(self) -> int:
         return len(self.ways)
 
-    def shared(self, shares: Sequence[float]) -> Tries:
+    def shared(self, shares: Sequence[float] | Array) -> Tries:
         """Return parts of all of them, the first share of each, then the next."""
         parts = np.asarray(shares, dtype=float)
         twice = np.tile(np.arange(len(self)), len(parts))
