@@ -29,11 +29,11 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
 from bullet_sim.errors import SimError
+from bullet_sim.ros.parameters import declare, refuse_unknown
 from bullet_sim.scene import Scene, TagSource, load_scene, with_model, with_tags
 from krang_sim.errors import KrangError
 from krang_sim.messages import LATCHED, message_types, to_messages
 from krang_sim.robot import SIDES
-from krang_sim.ros.parameters import declare, refuse_unknown
 from krang_sim.session import KrangSession
 
 PATIENCE = 0.1
