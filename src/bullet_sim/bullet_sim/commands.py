@@ -45,3 +45,7 @@ class CommandWatchdog:
         """Give the command in force at `time` [s]; zeros where none is."""
         given, values = self._values.get(group, (-math.inf, np.zeros(0)))
         return values if time - given < self._timeout else np.zeros(self._size[group])
+
+    def fresh(self, group: str, time: float) -> bool:
+        """Say whether a command is in force at `time` [s], be it zeros."""
+        return group in self._values and time - self._values[group][0] < self._timeout

@@ -1,6 +1,7 @@
 """Observations as ROS messages on their topics: the one place where both are known.
 
 Used by the node, which publishes them, and by runs without middleware, which write them into a recording.
+A simulator with observations of its own registers how they are translated: `@translate.register`.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ def to_messages(observation: Observation) -> Messages:
     Returns:
         Pairs of topic and message; header stamps are the observation's time.
     """
-    return _translate(observation)
+    return translate(observation)
 
 
 def stamp(time: float) -> Time:
@@ -75,16 +76,17 @@ def stamp(time: float) -> Time:
 
 
 @singledispatch
-def _translate(observation: object) -> Messages:
+def translate(observation: object) -> Messages:
+    """Translate one observation; kinds are added with `translate.register`."""
     raise TypeError(f"expected an observation of a simulator, got {type(observation).__name__}")
 
 
-@_translate.register
+@translate.register
 def _(observation: ClockTick) -> Messages:
     return [("/clock", Clock(clock=stamp(observation.time)))]
 
 
-@_translate.register
+@translate.register
 def _(observation: JointStates) -> Messages:
     message = JointState(
         header=Header(stamp=stamp(observation.time)),
@@ -95,13 +97,13 @@ def _(observation: JointStates) -> Messages:
     return [("/joint_states", message)]
 
 
-@_translate.register
+@translate.register
 def _(observation: Odometry) -> Messages:
     message = OdometryMsg(header=Header(stamp=stamp(observation.time), frame_id="odom"), child_frame_id="base")
     x, y, theta = observation.pose.tolist()
     place = message.pose.pose
     place.position.x, place.position.y = x, y
-    place.orientation = _heading(theta)
+    place.orientation = heading(theta)
     message.twist.twist.linear.x, message.twist.twist.angular.z = observation.twist.tolist()
     message.pose.covariance = message.twist.covariance = _odometry_covariance()
     return [("/odom", message)]
@@ -113,7 +115,7 @@ def _odometry_covariance() -> Array:
     return np.diag(observed).ravel()
 
 
-@_translate.register
+@translate.register
 def _(observation: Transforms) -> Messages:
     when = stamp(observation.time)
     rows = zip(
@@ -134,12 +136,12 @@ def _(observation: Transforms) -> Messages:
     return [("/tf_static" if observation.static else "/tf", TFMessage(transforms=transforms))]
 
 
-@_translate.register
+@translate.register
 def _(observation: RobotDescription) -> Messages:
     return [("/robot_description", String(data=observation.urdf))]
 
 
-@_translate.register
+@translate.register
 def _(observation: KnownScene) -> Messages:
     message = Scene(
         header=Header(stamp=stamp(observation.time), frame_id="world"),
@@ -162,7 +164,7 @@ def _body(body: KnownBody) -> Body:
     )
 
 
-@_translate.register
+@translate.register
 def _(observation: GraspState) -> Messages:
     grasps = [
         Grasp(gripper=hold.gripper, object=hold.object, contact_point=_point(hold.contact_point.tolist()))
@@ -171,7 +173,7 @@ def _(observation: GraspState) -> Messages:
     return [("/grasps", Grasps(header=Header(stamp=stamp(observation.time)), grasps=grasps))]
 
 
-@_translate.register
+@translate.register
 def _(observation: WristReading) -> Messages:
     message = WrenchStamped(header=Header(stamp=stamp(observation.time), frame_id=f"{observation.side}_ft"))
     message.wrench.force = _vector(observation.force.tolist())
@@ -179,7 +181,7 @@ def _(observation: WristReading) -> Messages:
     return [(f"/wrist_ft/{observation.side}", message)]
 
 
-@_translate.register
+@translate.register
 def _(observation: TagReading) -> Messages:
     message = PoseStamped(header=Header(stamp=stamp(observation.time), frame_id="world"))
     message.pose.position = _point(observation.position.tolist())
@@ -187,7 +189,7 @@ def _(observation: TagReading) -> Messages:
     return [(f"/ar_tags/{observation.tag}/pose", message)]
 
 
-@_translate.register
+@translate.register
 def _(observation: CameraPicture) -> Messages:
     header = Header(stamp=stamp(observation.time), frame_id=observation.frame)
     lines, width = observation.image.shape
@@ -214,7 +216,7 @@ def _(observation: CameraPicture) -> Messages:
     return [(f"{name}/camera_info", info), (f"{name}/image_raw", image)]
 
 
-@_translate.register
+@translate.register
 def _(observation: Outlines) -> Messages:
     header = Header(stamp=stamp(observation.time), frame_id="world")
     markers = [
@@ -251,7 +253,8 @@ def _quaternion(values: list[float]) -> Quaternion:
     return Quaternion(x=values[0], y=values[1], z=values[2], w=values[3])
 
 
-def _heading(theta: float) -> Quaternion:
+def heading(theta: float) -> Quaternion:
+    """Make the orientation of a turn by `theta` [rad] about the vertical."""
     return Quaternion(z=float(np.sin(theta / 2)), w=float(np.cos(theta / 2)))
 
 
