@@ -177,4 +177,4 @@ def find_board(
     solved, turn, place = cv2.solvePnP(points, corners, np.asarray(matrix), np.zeros(5), flags=cv2.SOLVEPNP_ITERATIVE)
     if not solved:
         return None
-    return cv2.Rodrigues(turn)[0], place[:, 0]
+    return np.array(cv2.Rodrigues(turn)[0], dtype=float), np.array(place[:, 0], dtype=float)

@@ -26,7 +26,7 @@ class LaserSettings(Settings):
         range_max: farthest that is seen [m]; beyond it a range is infinite.
         noise: white noise of a range [m].
         dropout: probability that one beam sees nothing.
-        sees_robot: whether the robot's own links are in the way; if not, they are left out, as the PR2's own filter does.
+        sees_robot: whether the robot's own links are in the way; else they are left out, as the PR2's filter does.
     """
 
     rate: Rate = 20.0

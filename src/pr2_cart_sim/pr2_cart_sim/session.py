@@ -42,10 +42,11 @@ FINGERS = GripperSpec(
     plate_end=0.198,
     plate_width=0.023,
     opening=0.090,
-    force=100.0,
-    torque_limit=2.0,
+    force=80.0,
+    friction=0.6,
+    torque_limit=1.5,
 )
-"""Of each hand: fingertips 36 x 23 mm, 90 mm apart when open, 100 N when closed; they reach along the frame's y."""
+"""Of each hand: fingertips 36 x 23 mm, 90 mm apart when open, 80 N when closed; they reach along the frame's y."""
 
 
 class Pr2Session:

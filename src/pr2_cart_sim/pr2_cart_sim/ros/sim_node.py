@@ -1,7 +1,7 @@
 """The PR2's simulator as a node: its own clock, all topics of the robot, commands, grasp and release.
 
-Its pace is that of `bullet_sim.ros.paced`. Commands: `/cmd_vel` (forward, left, turning), the arms' velocity controllers,
-`/torso_velocity_controller/commands` (1 value) and `/head_velocity_controller/commands` (pan, tilt).
+Its pace is that of `bullet_sim.ros.paced`. Commands: `/cmd_vel` (forward, left, turning), the arms' velocity
+controllers, `/torso_velocity_controller/commands` (1 value) and `/head_velocity_controller/commands` (pan, tilt).
 """
 
 from __future__ import annotations
