@@ -163,11 +163,10 @@ def find_board(
     Returns:
         Rotation (3, 3) and place (3,) [m] of the board in the camera's optical frame; None where it is not seen.
     """
-    found, corners = cv2.findChessboardCorners(image, (settings.columns, settings.rows))
+    # The one that looks for sectors: the older one, which looks for quadrangles, misses squares below some 20 px.
+    found, corners = cv2.findChessboardCornersSB(image, (settings.columns, settings.rows))
     if not found:
         return None
-    stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-3)
-    corners = cv2.cornerSubPix(image, corners, (4, 4), (-1, -1), stop)
     if corners[0, 0, 1] > corners[-1, 0, 1]:  # found upside down: nobody carries a cart so
         corners = corners[::-1]
     columns, rows = np.meshgrid(np.arange(settings.columns), np.arange(settings.rows))

@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 
 ROBOT_GROUP = 64
 """Bit of the robot's links in Bullet's collision filter, which rays can leave out."""
+STAGES = (2.5, 6.0, 14.0)
+"""Ranges [m] up to which beams are cast before those that hit nothing are cast on: Bullet looks at all that a ray
+crosses, also behind what it hits first."""
 AT_ONCE = 16_000
 """Rays that Bullet takes in one call at most."""
 
@@ -65,15 +68,27 @@ class Laser:
             Ranges (n,) [m]; infinite where nothing is within reach.
         """
         settings = self._settings
-        directions = self._directions @ pose.matrix.T
-        start = pose.position + settings.range_min * directions
-        end = pose.position + settings.range_max * directions
-        hits = self._api.rayTestBatch(start.tolist(), end.tolist(), numThreads=1, collisionFilterMask=self._mask)
-        share = np.array([hit[2] for hit in hits])
-        ranges = settings.range_min + share * (settings.range_max - settings.range_min)
+        ranges = self._cast(pose.position, self._directions @ pose.matrix.T)
         noise = self._rng.normal(0.0, settings.noise, len(ranges)) if settings.noise > 0 else 0.0
-        missed = (share >= 1.0) | (self._rng.random(len(ranges)) < settings.dropout)
+        missed = self._rng.random(len(ranges)) < settings.dropout
         return np.where(missed, np.inf, np.maximum(ranges + noise, settings.range_min))
+
+    def _cast(self, origin: Array, directions: Array) -> Array:
+        """Give true ranges (n,) [m] along directions (n, 3) from a place (3,) in `world`, infinite where nothing is."""
+        settings = self._settings
+        ranges, near = np.full(len(directions), np.inf), settings.range_min
+        open_beams = np.arange(len(directions))
+        for far in (*(stage for stage in STAGES if near < stage < settings.range_max), settings.range_max):
+            rays = directions[open_beams]
+            start, end = origin + near * rays, origin + far * rays
+            hits = self._api.rayTestBatch(start.tolist(), end.tolist(), numThreads=1, collisionFilterMask=self._mask)
+            share = np.array([hit[2] for hit in hits])
+            struck = share < 1.0
+            ranges[open_beams[struck]] = near + share[struck] * (far - near)
+            open_beams, near = open_beams[~struck], far
+            if len(open_beams) == 0:
+                break
+        return ranges
 
 
 class Nod:

@@ -98,7 +98,7 @@ class MapFile(Settings):
     origin: tuple[float, float, float]
     negate: Annotated[int, Field(ge=0, le=1)] = 0
     occupied_thresh: Annotated[float, Field(ge=0, le=1)] = 0.65
-    free_thresh: Annotated[float, Field(ge=0, le=1)] = 0.25
+    free_thresh: Annotated[float, Field(ge=0, le=1)] = 0.196
     mode: str = "trinary"
 
 
@@ -152,6 +152,6 @@ def save_map(grid: GridMap, path: Path) -> None:
         "origin": [*grid.origin, 0.0],
         "negate": 0,
         "occupied_thresh": 0.65,
-        "free_thresh": 0.25,
+        "free_thresh": 0.196,  # just below what 205 is
     }
     path.write_text(yaml.safe_dump(said, sort_keys=False), encoding="utf-8")
