@@ -34,6 +34,8 @@ Rectangle = tuple[float, float, float, float]
 Metres = Annotated[float, Field(gt=0.5, le=30)]
 Range = tuple[Metres, Metres]
 
+FAR_WIDTH = 6.0
+"""Of the rooms at the end of the side corridor at most [m]."""
 DOOR_MARGIN = 0.5
 """From a room's corner to its door at least [m]."""
 
@@ -147,8 +149,8 @@ def _far_rooms(plan: OfficePlan, rng: Generator, side: Rectangle, low: float, le
     wall, rooms = plan.wall, []
     bottom, top = side[1], low - wall
     spans = {
-        "far_west": (max(0.0, side[0] - wall - 6.0), side[0] - wall),
-        "far_east": (side[2] + wall, min(length, side[2] + wall + 6.0)),
+        "far_west": (max(0.0, side[0] - wall - FAR_WIDTH), side[0] - wall),
+        "far_east": (side[2] + wall, min(length, side[2] + wall + FAR_WIDTH)),
     }
     for name, (left, right) in spans.items():
         if right - left < plan.room_width[0] - 1.0:

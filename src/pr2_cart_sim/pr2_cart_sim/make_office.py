@@ -196,9 +196,7 @@ def _rounded(values: Any) -> Any:
 def main() -> None:
     """Run the command; errors are one line and exit code 2."""
     parser = argparse.ArgumentParser(prog="make_office", description="Make an office for the PR2's simulator.")
-    parser.add_argument(
-        "path", type=Path, help="scene file to write, e.g. office.yaml; its map goes into maps/ beside it"
-    )
+    parser.add_argument("path", type=Path, help="scene file to write; its map goes into maps/ beside it")
     parser.add_argument("--seed", type=int, default=0, help="of every draw")
     for name, text in {"rooms": "north of the corridor", "people": "that walk about", "movable": "chairs"}.items():
         parser.add_argument(f"--{name}", type=int, help=f"how many {text}")
@@ -209,3 +207,7 @@ def main() -> None:
     except SimError as error:
         print(f"make_office: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()
