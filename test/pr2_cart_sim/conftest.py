@@ -49,7 +49,7 @@ ROOM = {"outline": [[-3.0, -3.0], [6.0, -3.0], [6.0, 3.0], [-3.0, 3.0]]}
 FEW_BEAMS = {"base_laser": {"increment": 0.05}, "tilt_laser": {"increment": 0.05}}
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_scene() -> Callable[..., OfficeScene]:
     """Make a scene with a cart in the robot's hands; keyword arguments replace or add sections."""
 
@@ -86,6 +86,6 @@ def let_run(session: Pr2Session, seconds: float, command: Callable[[], None] | N
     return seen
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def run() -> Callable[..., list[Observation]]:
     return let_run

@@ -17,6 +17,7 @@ from pr2_cart_sim.errors import Pr2Error
 from pr2_cart_sim.messages import MESSAGE_TYPES, to_messages
 from pr2_cart_sim.observations import BaseOdometry, CartReading, Localisation
 from pr2_cart_sim.sensing import in_base
+from pr2_cart_sim.session import STEP, Pr2Session
 
 SPEED = 0.3
 
@@ -35,12 +36,11 @@ def to_text(observations):
     ]
 
 
-@pytest.fixture
-def pushed(make_scene, make_session, run):
-    """A session after two seconds of pushing the cart."""
-    session = make_session(make_scene())
-    seen = run(session, 2.0, lambda: session.command_base(SPEED, 0.0, 0.0))
-    return session, seen
+@pytest.fixture(scope="module")
+def pushed(make_scene, run):
+    """A session after two seconds of pushing the cart, and what it gave; to be looked at, not to be stepped."""
+    with Pr2Session(make_scene(), seed=1) as session:
+        yield session, run(session, 2.0, lambda: session.command_base(SPEED, 0.0, 0.0))
 
 
 def test_cart_goes_where_the_robot_pushes_it(pushed):
@@ -91,6 +91,15 @@ def test_odometry_and_localisation_are_near_the_truth(pushed):
     assert np.abs(last(seen, BaseOdometry).pose - pose).max() < 0.05
     assert last(seen, BaseOdometry).twist[0] == pytest.approx(SPEED, rel=0.25)
     assert np.abs(last(seen, Localisation).pose - pose).max() < 0.15
+
+
+def test_a_smaller_step_is_the_same_run(make_scene, make_session, run):
+    ends = []
+    for step in (STEP, STEP / 2):
+        session = make_session(make_scene(), step=step)
+        run(session, 0.8, lambda session=session: session.command_base(0.3, 0.05, 0.3))
+        ends.append(np.concatenate([session.robot_truth()[0], session.truth("cart").planar]))
+    np.testing.assert_allclose(*ends, atol=1.5e-3)
 
 
 @pytest.mark.parametrize("command", [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.7, 0.7, 2.0)])

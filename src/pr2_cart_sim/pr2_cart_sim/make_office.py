@@ -25,7 +25,7 @@ from pr2_cart_sim.maps import GridMap, save_map
 
 Array = NDArray[np.float64]
 
-CART = {"kind": "utility_cart", "size": [1.0, 0.55], "height": 0.90, "nominal_mass": 25.0}
+CART = {"kind": "utility_cart", "size": [1.0, 0.55], "height": 0.90, "nominal_mass": 25.0, "upper_shelf": False}
 AHEAD = 0.65 + 0.484
 """From `base` to the middle of a cart whose bar is between the fingers [m]."""
 TORSO = 0.244

@@ -7,7 +7,7 @@ through each other and through furniture that their route crosses; before robot 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,8 @@ from pr2_cart_sim.scene import Manners, Person
 
 Array = NDArray[np.float64]
 
+Disc = tuple[float, float, float]
+
 TICK = 0.01
 """[s] between two moves of people."""
 TOUCH = 0.01
@@ -28,6 +30,8 @@ TURNING = 4.0
 """Rate [rad/s] at which people turn."""
 ARRIVED = 0.05
 """[m]"""
+DRAWS = 50
+"""Places that are drawn at most for somebody to start from."""
 CHEST = 1.0
 """Height [m] at which somebody looks whether the way is free."""
 
@@ -59,20 +63,29 @@ class Walker:
         errand: whether they are out to stand in front of the robot, or stand there.
     """
 
-    def __init__(self, body: PersonBody, person: Person, manners: Manners, rng: Generator) -> None:
-        """Start somewhere along the route, drawn from `rng`, which is kept."""
+    def __init__(
+        self, body: PersonBody, person: Person, manners: Manners, rng: Generator, taken: Sequence[Disc] = ()
+    ) -> None:
+        """Start somewhere along the route, drawn from `rng`, which is kept, and outside what is `taken` if possible."""
         self._body = body
         self._person, self._manners, self._rng = person, manners, rng
         self._route = np.array(person.route)
-        self._next = int(rng.integers(len(self._route)))
-        other = self._route[(self._next - 1) % len(self._route)] if self._next > 0 else self._route[self._next]
-        self.place = other + rng.random() * (self._route[self._next] - other)
+        for _ in range(DRAWS):
+            self._next, self.place = self._draw_start()
+            if all(math.hypot(self.place[0] - x, self.place[1] - y) > r for x, y, r in taken):
+                break
         self._forward = True
         self.heading, self.speed, self._walked = float(rng.uniform(-math.pi, math.pi)), 0.0, 0.0
         self._rest, self._waited, self._stands, self.errand = 0.0, 0.0, False, False
         self._errand_goal: Array | None = None
         self._left_from = self.place
         self._put(0.0)
+
+    def _draw_start(self) -> tuple[int, Array]:
+        """Draw a place on the route, and to which of its corners it leads."""
+        ahead = int(self._rng.integers(len(self._route)))
+        behind = self._route[max(ahead - 1, 0)]
+        return ahead, behind + self._rng.random() * (self._route[ahead] - behind)
 
     def move(self, near: Nearness | None) -> None:
         """Live for one tick; `near`: how near robot or cart is, None where it is not."""
@@ -160,12 +173,27 @@ class Crowd:
         walkers: by name.
     """
 
-    def __init__(self, client: BulletClient, people: Mapping[str, Person], manners: Manners, rng: Generator) -> None:
-        """Put people into the world; `rng` gives each a generator of their own."""
+    def __init__(
+        self,
+        client: BulletClient,
+        people: Mapping[str, Person],
+        manners: Manners,
+        rng: Generator,
+        taken: Sequence[Disc] = (),
+    ) -> None:
+        """Put people into the world.
+
+        Args:
+            client: the world.
+            people: by name.
+            manners: of all of them.
+            rng: gives each a generator of their own.
+            taken: where nobody may be at the start, as x, y, radius [m].
+        """
         self._api, self._manners = client.api, manners
         streams = rng.spawn(len(people)) if people else []
         self.walkers = {
-            name: Walker(PersonBody(client, name, person, which), person, manners, stream)
+            name: Walker(PersonBody(client, name, person, which), person, manners, stream, taken)
             for which, ((name, person), stream) in enumerate(zip(people.items(), streams, strict=True))
         }
         self._chance = dict(zip(people, streams, strict=True))

@@ -65,8 +65,12 @@ class Office:
         self.robot = PR2(client, scene.robot.pose, start)
         mark_robot(client)
         self._check_start()
-        self.crowd = Crowd(client, scene.people, scene.manners, people_rng)
         self.cart = scene.robot.holds or next((name for name, body in scene.bodies.items() if _is_cart(body)), None)
+        margin = scene.manners.margin
+        taken = [(*scene.robot.pose[:2], 0.9 + margin)]
+        if self.cart is not None:
+            taken.append((*scene.bodies[self.cart].pose[:2], 0.9 + margin))
+        self.crowd = Crowd(client, scene.people, scene.manners, people_rng, taken)
         movers = {"robot": NAME} | ({self.cart: self.cart} if self.cart else {})
         self.proximity = Proximity(client, movers, scene.people)
         self._ticks = 0
