@@ -125,6 +125,7 @@ def test_shipped_offices_run(name, make_session, run):
         ({"people": {"1st": {"route": [[0, 0]]}}}, "expected a name of letters"),
         ({"people": {"ann": {"route": []}}}, "people.ann.route"),
         ({"peopel": {}}, "did you mean 'people'"),
+        ({"models": {"cart": "cart.yaml"}}, "models: expected none"),
         ({"robot": {"holds": "cat"}}, "did you mean 'cart'"),
     ],
 )

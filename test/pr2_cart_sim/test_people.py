@@ -122,6 +122,17 @@ def test_the_cart_that_is_driven_into_somebody_is_a_contact(make_scene, make_ses
     assert session.truth("cart").planar[0] < 1.9 - 0.5 - 0.1  # people are not pushed aside
 
 
+def test_a_wall_and_furniture_that_are_touched_are_contacts_with_nobody(make_scene, make_session, run):
+    square = [[0, 0], [0.3, 0], [0.3, 0.3], [0, 0.3]]
+    post = {"kind": "fixture", "polygon": square, "height": 1.0, "pose": [1.75, -0.15, 0]}
+    session = make_session(make_scene(clutter={"post": post}))
+    run(session, 0.8, lambda: session.command_base(0.3, 0.0, 0.0))
+    (contact,) = session.contacts
+    assert (contact.mover, contact.other, contact.person) == ("cart", "post", False)
+    assert contact.peak > 0
+    assert session.clearance.people == {}
+
+
 def test_clearance_is_the_gap_to_people_and_things(make_scene, make_session, run):
     post = {
         "kind": "fixture",

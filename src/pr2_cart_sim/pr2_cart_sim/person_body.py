@@ -1,4 +1,4 @@
-"""A person's body in Bullet: an elliptic trunk, and two legs that swing, which a laser low over the floor sees.
+"""A person's body in Bullet: a head, an elliptic trunk, and two legs that swing, which a laser low over the floor sees.
 
 It has no mass: nothing pushes it, it stands where it is put.
 """
@@ -22,6 +22,8 @@ STRIDE = 0.30
 """How far a foot swings ahead of the hip at full speed [m]."""
 CADENCE = 2 * math.pi / 1.4
 """Phase of the gait per way walked [rad/m]: a double step is 1.4 m."""
+HEAD_RADIUS = 0.11
+"""[m]"""
 CORNERS = 16
 """Of the prism that stands for an ellipse."""
 SHIRTS = (
@@ -31,6 +33,7 @@ SHIRTS = (
     (0.78, 0.62, 0.25, 1),
     (0.5, 0.4, 0.6, 1),
 )
+SKIN = (0.86, 0.70, 0.58, 1)
 TROUSERS = (0.22, 0.24, 0.32, 1)
 
 
@@ -53,9 +56,10 @@ class PersonBody:
         api = client.api
         self._api, self._person = api, person
         low = LEG_SHARE * person.height if person.legs else 0.0
+        shoulders = max(person.height - 2.2 * HEAD_RADIUS, low + 0.1)
         angles = 2 * math.pi * np.arange(CORNERS) / CORNERS
         ring = np.column_stack([person.depth * np.cos(angles), person.radius * np.sin(angles)])
-        corners = [[*place, z] for z in (low, person.height) for place in ring.tolist()]
+        corners = [[*place, z] for z in (low, shoulders) for place in ring.tolist()]
         hull = api.createCollisionShape(bullet.GEOM_MESH, vertices=corners)
         look = api.createVisualShape(
             bullet.GEOM_MESH, vertices=corners, indices=_faces(), rgbaColor=SHIRTS[which % len(SHIRTS)]
@@ -68,6 +72,9 @@ class PersonBody:
                 seen = api.createVisualShape(bullet.GEOM_CYLINDER, length=low, rgbaColor=TROUSERS, **sizes)
                 place = (0, side * max(person.radius / 2, LEG_RADIUS), low / 2)
                 links.add(0.0, (felt, seen), place, -1, (1, 0, 0), joint=bullet.JOINT_PRISMATIC)
+        head = api.createCollisionShape(bullet.GEOM_SPHERE, radius=HEAD_RADIUS)
+        face = api.createVisualShape(bullet.GEOM_SPHERE, radius=HEAD_RADIUS, rgbaColor=SKIN)
+        links.add(0.0, (head, face), (0, 0, max(person.height, shoulders) - HEAD_RADIUS), -1, (0, 0, 1), rigid=True)
         self.number = int(
             api.createMultiBody(baseMass=0, baseCollisionShapeIndex=hull, baseVisualShapeIndex=look, **links.columns)
         )

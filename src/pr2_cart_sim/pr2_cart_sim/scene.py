@@ -106,6 +106,8 @@ class OfficeScene(Scene):
                 raise ValueError(
                     f"expected a name of letters, digits and underscores that starts with a letter, got {name[:60]!r}"
                 )
+        if self.models:
+            raise ValueError("models: expected none in an office, got some; only Krang's scenes have learned ones")
         twice = [name for name in self.clutter if name in self.bodies]
         if twice:
             raise ValueError(f"clutter.{twice[0]}: expected a name of its own, bodies has it too")
