@@ -97,7 +97,7 @@ def test_a_smaller_step_is_the_same_run(make_scene, make_session, run):
     ends = []
     for step in (STEP, STEP / 2):
         session = make_session(make_scene(), step=step)
-        run(session, 0.8, lambda session=session: session.command_base(0.3, 0.05, 0.3))
+        run(session, 0.5, lambda session=session: session.command_base(0.3, 0.05, 0.3))
         ends.append(np.concatenate([session.robot_truth()[0], session.truth("cart").planar]))
     np.testing.assert_allclose(*ends, atol=1.5e-3)
 

@@ -135,13 +135,8 @@ def test_a_robot_of_standard_topics(node, listener):
     assert b"Traceback" not in out + err
 
 
-@pytest.mark.parametrize(
-    ("parameter", "words"),
-    [("scene:=nonsense", "office 'nonsense'"), ("checkerboard:=maybe", "expected noise, rendered, off")],
-)
-def test_errors_at_start_are_one_line_and_exit_2(parameter, words):
-    done = subprocess.run(command(parameter), env=ENVIRONMENT, capture_output=True, timeout=PATIENCE, text=True)
+def test_errors_at_start_are_one_line_and_exit_2():
+    done = subprocess.run(command("scene:=nonsense"), env=ENVIRONMENT, capture_output=True, timeout=PATIENCE, text=True)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
-    assert done.stderr.startswith("sim_node: ")
-    assert words in done.stderr
+    assert done.stderr.startswith("sim_node: office 'nonsense'")
