@@ -13,7 +13,7 @@ from shapely.geometry import Polygon
 
 from pbrl_control.errors import ControlError
 from pbrl_control.navigation.floor_map import as_polygon
-from pbrl_control.planar import Array, rotation
+from pbrl_control.planar import Array
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.lattice.sweep_kernel import cover_all
 
@@ -161,19 +161,20 @@ def rectangle(back: float, front: float, half: float) -> Array:
 
 def convex_pieces(ring: Array) -> list[NDArray[np.int64]]:
     """Return convex pieces of a simple polygon (k, 2), as numbers of its corners in order."""
-    polygon = Polygon(ring)
-    if not polygon.is_valid:
-        return [np.arange(len(ring))]
-    if math.isclose(polygon.convex_hull.area, polygon.area, rel_tol=1e-9):
+    sides = np.roll(ring, -1, axis=0) - ring
+    after = np.roll(sides, -1, axis=0)
+    bends = sides[:, 0] * after[:, 1] - sides[:, 1] * after[:, 0]
+    if (bends >= -1e-12).all() or (bends <= 1e-12).all():
         return [np.arange(len(ring))]
     pieces = []
-    for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(polygon)):
+    for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(Polygon(ring))):
         corners = np.array(triangle.exterior.coords)[:-1]
         pieces.append(np.argmin(np.hypot(*(corners[:, None] - ring[None]).transpose(2, 0, 1)), axis=1))
     return pieces
 
 
 def _turned(points: Array, angles: Array) -> Array:
-    """Return points (n or 1, k, 2) turned by angles (n,)."""
-    turns = np.array([rotation(float(angle)) for angle in angles])
-    return np.einsum("nij,nkj->nki", turns, np.broadcast_to(points, (len(angles), *points.shape[1:])))
+    """Return points (n or 1, k, 2) turned by angles (n,), as (n, k, 2)."""
+    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    x, y = points[..., 0], points[..., 1]
+    return np.stack((c * x - s * y, s * x + c * y), axis=-1)

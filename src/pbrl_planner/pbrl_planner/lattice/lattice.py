@@ -13,15 +13,61 @@ from pbrl_control.planar import Array
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.lattice.body import ArticulatedBody
 from pbrl_planner.lattice.grid import CostGrid
-from pbrl_planner.lattice.moves import Move, MoveTables, floor_moves, moves_of, reach_of
+from pbrl_planner.lattice.moves import MoveTables, Relaxed, moves_of, reach_of, relax
 from pbrl_planner.lattice.primitives import TURN, Pace, PrimitiveSet
-from pbrl_planner.lattice.sweeps import Floor, Sweeps, cut_up, overlaps
+from pbrl_planner.lattice.search_kernel import LIMIT
+from pbrl_planner.lattice.sweeps import Floor, Sweeps, cut_up, shut_cells
 
 SAME = 1e-6  # of a resolution, relative, by which two count as one
 MOST_STATES = 1 << 30
 BORDER = 255
 """Cost of the cells around the map."""
 State = tuple[int, int, int, int]
+
+
+class Motions:
+    """Primitives, what they cost and what they sweep: everything that does not depend on a floor.
+
+    What takes long is found out once, when it is asked for first, and holds for every floor.
+
+    Args:
+        primitives: the motions.
+        pace: speeds, which make the costs.
+        body: outlines of robot and cart; None: a point moves, and the floor's costs say where it may be.
+
+    Raises:
+        PlannerError: there are articulations but no cart.
+    """
+
+    def __init__(
+        self, primitives: PrimitiveSet, pace: Pace | None = None, body: ArticulatedBody | None = None
+    ) -> None:
+        if len(primitives.articulations) > 1 and (body is None or body.cart is None):
+            raise PlannerError("body: expected one with a cart, since the primitives have articulations, got none")
+        self.primitives, self.body, self.pace = primitives, body, pace or Pace()
+        self.costs = primitives.base_costs(self.pace)
+        self.moves = moves_of(primitives, self.costs, body)
+
+    @cached_property
+    def relaxed(self) -> Relaxed:
+        """What the lower bound is made of."""
+        return relax(self.moves, self.primitives.bins, LIMIT)
+
+    @cached_property
+    def masks(self) -> list[NDArray[np.bool_]]:
+        """Cells that each primitive sweeps; none for a point."""
+        if self.body is None:
+            return []
+        return [self.body.mask(each.poses, self.primitives.resolution) for each in self.primitives.primitives]
+
+    @cached_property
+    def stances(self) -> list[NDArray[np.int32]]:
+        """Cells that the body covers at each heading and articulation, cut up; none for a point."""
+        if self.body is None:
+            return []
+        turns = np.arange(self.primitives.headings) * TURN / self.primitives.headings
+        poses = [np.array([[0.0, 0.0, turn, phi]]) for turn in turns for phi in self.primitives.articulations]
+        return [cut_up(self.body.mask(pose, self.primitives.resolution)) for pose in poses]
 
 
 class Lattice:
@@ -31,30 +77,22 @@ class Lattice:
 
     Args:
         grid: the floor.
-        primitives: the motions; of the same resolution as the floor.
-        pace: speeds, which make the costs.
-        body: outlines of robot and cart; None: a point moves, and the floor's costs say where it may be.
+        motions: of the same resolution as the floor.
 
     Raises:
-        PlannerError: the resolutions differ, articulations and body do not go together, or there are too many states.
+        PlannerError: the resolutions differ, or there are too many states.
     """
 
-    def __init__(
-        self, grid: CostGrid, primitives: PrimitiveSet, pace: Pace | None = None, body: ArticulatedBody | None = None
-    ) -> None:
+    def __init__(self, grid: CostGrid, motions: Motions) -> None:
+        primitives = motions.primitives
         if not math.isclose(grid.resolution, primitives.resolution, rel_tol=SAME):
             raise PlannerError(
                 f"map: expected the primitives' resolution {primitives.resolution:g} m, got {grid.resolution:g} m; "
                 "give the map's cells that size with resampled()"
             )
-        if len(primitives.articulations) > 1 and (body is None or body.cart is None):
-            raise PlannerError("body: expected one with a cart, since the primitives have articulations, got none")
-        self.grid, self.primitives, self.body = grid, primitives, body
-        self.pace = pace or Pace()
-        self.costs = primitives.base_costs(self.pace)
-        self.moves = moves_of(primitives, self.costs, body)
+        self.grid, self.motions, self.primitives, self.body = grid, motions, primitives, motions.body
         rows, columns = grid.cells.shape
-        self.border = reach_of(self.moves)
+        self.border = reach_of(motions.moves)
         self.stride = columns + 2 * self.border
         self.cells = self.stride * (rows + 2 * self.border)
         if self.cells * primitives.bins > MOST_STATES:
@@ -72,11 +110,11 @@ class Lattice:
 
     @cached_property
     def _forward(self) -> MoveTables:
-        return MoveTables.of(self.moves, self.primitives.bins, self.stride)
+        return MoveTables.of(self.motions.moves, self.primitives.bins, self.stride)
 
     @cached_property
     def _backward(self) -> MoveTables:
-        return MoveTables.of([move.reverse() for move in self.moves], self.primitives.bins, self.stride)
+        return MoveTables.of([move.reverse() for move in self.motions.moves], self.primitives.bins, self.stride)
 
     def sweeps(self, direction: Literal["forward", "backward"]) -> Sweeps:
         """Return what each move sweeps, and what of that is known to be free."""
@@ -88,13 +126,8 @@ class Lattice:
         cut = []
         for number in self.tables(direction).primitive:
             dx, dy = self.primitives.primitives[number].end[:2] if direction == "backward" else (0, 0)
-            cut.append(cut_up(self._swept_masks[number], dx, dy))
+            cut.append(cut_up(self.motions.masks[number], dx, dy))
         return Sweeps.of(cut, self._floor, *self.cost.shape)
-
-    @cached_property
-    def _swept_masks(self) -> list[NDArray[np.bool_]]:
-        assert self.body is not None, "asked only where there is one"
-        return [self.body.mask(each.poses, self.grid.resolution) for each in self.primitives.primitives]
 
     @cached_property
     def _floor(self) -> Floor:
@@ -103,7 +136,7 @@ class Lattice:
         inside = (slice(self.border, self.border + rows), slice(self.border, self.border + columns))
         taken[inside] = self.grid.cells >= self.grid.lethal
         # Twice: searched from the goal, a sweep is seen from where it ends.
-        return Floor.of(taken, 2 * max(len(mask) // 2 for mask in self._swept_masks))
+        return Floor.of(taken, 2 * max(len(mask) // 2 for mask in self.motions.masks))
 
     def floor_tables(self, direction: Literal["forward", "backward"]) -> MoveTables:
         """Return the moves of the lower bound on the floor: to the goal, or to the start from everywhere."""
@@ -111,28 +144,25 @@ class Lattice:
 
     @cached_property
     def _floor_forward(self) -> MoveTables:
-        return MoveTables.of(self._floor_moves, 1, self.stride)
+        return MoveTables.of(self.motions.relaxed.floor, 1, self.stride)
 
     @cached_property
     def _floor_backward(self) -> MoveTables:
-        return MoveTables.of([move.reverse() for move in self._floor_moves], 1, self.stride)
+        return MoveTables.of([move.reverse() for move in self.motions.relaxed.floor], 1, self.stride)
 
-    @cached_property
-    def _floor_moves(self) -> list[Move]:
-        return floor_moves(self.moves)
+    def turning(self, goal: int, direction: Literal["forward", "backward"]) -> NDArray[np.int32]:
+        """Return the lower bound (bins,) on changing from each bin to the goal's, or from there to each."""
+        turning = self.motions.relaxed.turning
+        found = turning[:, goal] if direction == "forward" else turning[goal]
+        return np.minimum(found, LIMIT).astype(np.int32)
 
     @cached_property
     def floor_cost(self) -> NDArray[np.uint8]:
-        """Costs for the lower bound: closed, too, where something stands in what the body covers however it turns."""
+        """Costs for the lower bound: closed, too, where the body meets something however it is turned and articulated."""
         found = self.cost.copy()
         if self.body is not None:
-            masks = [self.body.mask(pose[None], self.grid.resolution) for pose in self._poses_of_bins()]
-            found[overlaps(np.logical_and.reduce(masks), self._floor, *self.cost.shape)] = BORDER
+            found[shut_cells(self.motions.stances, self._floor, *self.cost.shape)] = BORDER
         return np.ascontiguousarray(found.ravel())
-
-    def _poses_of_bins(self) -> list[Array]:
-        turns = np.arange(self.primitives.headings) * TURN / self.primitives.headings
-        return [np.array([0.0, 0.0, turn, phi]) for turn in turns for phi in self.primitives.articulations]
 
     def fault(self, state: State) -> str:
         """Return what is wrong with being in a state, in words; empty where nothing is."""
@@ -166,7 +196,7 @@ class Lattice:
         cell, total = divmod(self.number_of(state), self.primitives.bins)[0], 0
         cost = self.cost.ravel()
         for number in primitives:
-            move = self.moves[number]
+            move = self.motions.moves[number]
             crossed = [(0, 0), (move.dx, move.dy), *move.dear]
             total += move.cost * (1 + max(int(cost[cell + y * self.stride + x]) for x, y in crossed))
             cell += move.dy * self.stride + move.dx

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +82,7 @@ class MoveTables:
     cells: Int
     primitive: Int
     rank: NDArray[np.uint8]
+    target: Int
     into: tuple[Int, ...]
 
     @classmethod
@@ -112,6 +113,7 @@ class MoveTables:
             _ints([cell for each in cells for cell in each]),
             _ints([move.primitive for move in ordered]),
             np.array(rank, dtype=np.uint8),
+            _ints([move.target for move in ordered]),
             tuple(_ints(each) for each in into),
         )
 
@@ -125,33 +127,64 @@ def reach_of(moves: list[Move]) -> int:
     return max(max(abs(x), abs(y)) for move in moves for x, y in (*move.dear, (move.dx, move.dy)))
 
 
-def floor_moves(moves: list[Move]) -> list[Move]:
-    """Return moves between cells, headings forgotten, whose cheapest ways never cost more than the lattice's.
+@dataclass(frozen=True)
+class Relaxed:
+    """Two easier problems, whose costs together never exceed the lattice's: places alone, and bins alone.
 
-    The least cost between two cells of what is left when headings and articulation are forgotten is a lower bound h
-    with h(a) <= cost(a, b) + h(b) for each edge: every edge is one of the moves. Most moves can be left out, being no
-    cheaper than a way by others through cells that they cross themselves.
+    Attributes:
+        floor: moves between cells, headings forgotten; most primitives are left out, being no cheaper than a way by
+            others through cells that they cross themselves.
+        turning: (bins, bins) of changing from each bin to each other anywhere; as good as infinite where that cannot be.
     """
+
+    floor: list[Move]
+    turning: NDArray[np.int64]
+
+
+def relax(moves: list[Move], bins: int, limit: int) -> Relaxed:
+    """Split each move's cost into a share for going there and a share for turning.
+
+    h(a) <= cost(a, b) + h(b) then holds of the sum h of both problems' costs to the goal, for each edge: the edge is a
+    move in both, at its shares. Going there gets what it would cost without turning, at most all; turning the rest.
+    """
+    steady = _needed([move for move in moves if move.source == move.target])
+    shares = [min(move.cost, _cost_of_others(move, steady)) if _goes(move) else 0 for move in moves]
+    turning = np.full((bins, bins), limit, dtype=np.int64)
+    np.fill_diagonal(turning, 0)
+    for move, share in zip(moves, shares, strict=True):
+        turning[move.source, move.target] = min(turning[move.source, move.target], move.cost - share)
+    for middle in range(bins):
+        np.minimum(turning, turning[:, middle, None] + turning[None, middle], out=turning)
+    going = [replace(move, cost=share) for move, share in zip(moves, shares, strict=True)]
+    return Relaxed(_needed(going), turning)
+
+
+def _goes(move: Move) -> bool:
+    return (move.dx, move.dy) != (0, 0)
+
+
+def _needed(moves: list[Move]) -> list[Move]:
+    """Return those moves between cells that no others can take the place of, as moves of one bin."""
     cheapest: dict[tuple[int, int, Cells], Move] = {}
     for move in moves:
         key = (move.dx, move.dy, move.centre)
-        if (move.dx, move.dy) != (0, 0) and (key not in cheapest or move.cost < cheapest[key].cost):
-            cheapest[key] = move
+        if _goes(move) and (key not in cheapest or move.cost < cheapest[key].cost):
+            cheapest[key] = replace(move, source=0, target=0, dear=move.centre)
     kept: list[Move] = []
     for move in sorted(cheapest.values(), key=lambda m: (m.cost, len(m.centre), m.dx, m.dy, sorted(m.centre))):
-        if not _can_be_put_together(move, kept):
+        if _cost_of_others(move, kept) > move.cost:
             kept.append(move)
-    return [Move(0, 0, m.dx, m.dy, m.cost, m.centre, m.centre, m.primitive) for m in kept]
+    return kept
 
 
-def _can_be_put_together(move: Move, others: list[Move]) -> bool:
-    """Say whether other moves lead through a move's own cells to its end at no higher cost."""
+def _cost_of_others(move: Move, others: list[Move]) -> int:
+    """Return the least cost of a move's way by others through its own cells; one more than its own where that is less."""
     allowed = {*move.centre, (0, 0), (move.dx, move.dy)}
     queue, best = [(0, (0, 0))], {(0, 0): 0}
     while queue:
         cost, (x, y) = heapq.heappop(queue)
         if (x, y) == (move.dx, move.dy):
-            return True
+            return cost
         if cost > best[(x, y)]:
             continue
         for other in others:
@@ -161,4 +194,4 @@ def _can_be_put_together(move: Move, others: list[Move]) -> bool:
             if all((x + cx, y + cy) in allowed for cx, cy in other.centre):
                 best[end] = total
                 heapq.heappush(queue, (total, end))
-    return False
+    return move.cost + 1

@@ -15,7 +15,7 @@ from pbrl_planner.lattice import search_kernel as kernel
 from pbrl_planner.lattice.heuristic_kernel import cell_costs
 from pbrl_planner.lattice.plan import Improvement, LatticePlan
 from pbrl_planner.lattice.problem import LatticeProblem
-from pbrl_planner.lattice.settings import DENOMINATOR, LatticeSettings
+from pbrl_planner.lattice.settings import LatticeSettings
 
 AT_ONCE = 20_000
 """Expansions between two looks at the clock."""
@@ -76,6 +76,7 @@ class _Search:
             kernel.LIMIT,
             self._toward,
         )
+        self._turning = lattice.turning(self._goal % self._bins, settings.direction)
         self._to_bound = self._elapsed()
         self._room = np.zeros(lattice.cells * self._bins, dtype=np.int32)
         self._seen = np.zeros(lattice.cells * self._bins, dtype=np.uint16)
@@ -85,8 +86,8 @@ class _Search:
 
     def run(self) -> LatticePlan:
         """Lower epsilon round by round."""
-        if self._toward[self._root // self._bins] >= kernel.LIMIT:
-            return self._result(True, "there is no way even if the robot's heading is forgotten")
+        if self._bound(self._root) >= kernel.LIMIT:
+            return self._result(True, "there is no way for the robot's centre, or none to turn so, whatever it does")
         numerators = self._settings.numerators
         self._open(numerators[0])
         place = 0
@@ -100,16 +101,20 @@ class _Search:
             if self._tell() or place >= len(numerators):
                 return self._result(False, "")
 
+    def _bound(self, state: int) -> int:
+        """Return the lower bound h of the cost from a state to the goal."""
+        return int(self._toward[state // self._bins]) + int(self._turning[state % self._bins])
+
     def _open(self, numerator: int) -> None:
         shift = int(self._lattice.cells * self._bins).bit_length()
         numbers = self._numbers
-        numbers[kernel.GOAL], numbers[kernel.NUMERATOR], numbers[kernel.DENOMINATOR] = self._goal, numerator, DENOMINATOR
+        numbers[kernel.GOAL], numbers[kernel.NUMERATOR] = self._goal, numerator
+        numbers[kernel.DENOMINATOR] = self._settings.denominator
         numbers[kernel.SHIFT], numbers[kernel.ROUND] = shift, 1
-        if kernel.LIMIT * (numerator + DENOMINATOR) >= 1 << (62 - shift):
-            raise PlannerError(f"epsilon: expected less for so many states, got {numerator / DENOMINATOR:g}")
+        numbers[kernel.MOST] = min(kernel.LIMIT, (1 << (62 - shift)) // numerator)
         self._room[self._root] = kernel.LIMIT
         numbers[kernel.TOUCHED] = 1
-        self._heap[0] = ((numerator * int(self._toward[self._root // self._bins])) << shift) | self._root
+        self._heap[0] = ((numerator * self._bound(self._root)) << shift) | self._root
         numbers[kernel.HEAP] = 1
 
     def _round(self) -> int:
@@ -128,10 +133,12 @@ class _Search:
                 tables.cells_first,
                 tables.cells,
                 tables.rank,
+                tables.target,
                 cost,
                 lattice.grid.blocked,
                 self._bins,
                 self._toward,
+                self._turning,
                 self._room,
                 self._seen,
                 self._heap,
@@ -148,7 +155,7 @@ class _Search:
             )
             if status == kernel.TOO_COSTLY:
                 raise PlannerError(
-                    f"costs: expected sums below {kernel.LIMIT}, got more; lower the multipliers or the map's costs"
+                    f"costs: expected sums below {self._numbers[kernel.MOST]}, got more; lower the multipliers or the map's costs"
                 )
             if status == kernel.FULL:
                 self._heap, self._waiting = _grown(self._heap), _grown(self._waiting)
@@ -159,6 +166,8 @@ class _Search:
         """Note the plan, prove its bound, and make ready for the next epsilon that is below it; return its place."""
         moves, cost = self._way()
         self._best = (cost, moves)
+        # What is ahead of the goal on its way may have got cheaper since the goal was reached from there.
+        self._room[self._goal] = kernel.LIMIT - cost
         while True:
             place += 1
             entries = int(self._numbers[kernel.HEAP] + self._numbers[kernel.WAITING])
@@ -168,6 +177,7 @@ class _Search:
             least = kernel.next_round(
                 self._bins,
                 self._toward,
+                self._turning,
                 self._room,
                 self._seen,
                 self._heap,
@@ -177,10 +187,10 @@ class _Search:
             )
             self._least = max(1, self._least, min(least, cost))
             proved = max(1.0, cost / self._least)
-            self._epsilon = min(self._epsilon, proved, numerators[place - 1] / DENOMINATOR)
+            self._epsilon = min(self._epsilon, proved, numerators[place - 1] / self._settings.denominator)
             if place >= len(numerators) or self._epsilon <= self._settings.last_epsilon:
                 return len(numerators)
-            if numerator < self._epsilon * DENOMINATOR:
+            if numerator < self._epsilon * self._settings.denominator:
                 return place
 
     def _way(self) -> tuple[NDArray[np.int64], int]:

@@ -25,10 +25,10 @@ LIMIT = 1 << 30
 """Costs end here."""
 DONE, EXHAUSTED, BUDGET, FULL, TOO_COSTLY = range(5)
 """Why a call returned: the goal is as good as this epsilon asks, nothing is left to expand, the expansions that were
-allowed are used up, the heap or the list of inconsistent states needs room, a cost has reached LIMIT."""
-(HEAP, WAITING, EXPANDED, GOAL, NUMERATOR, DENOMINATOR, SHIFT, ROUND, SPENT, TOUCHED) = range(10)
+allowed are used up, the heap or the list of inconsistent states needs room, a cost has become too large."""
+(HEAP, WAITING, EXPANDED, GOAL, NUMERATOR, DENOMINATOR, SHIFT, ROUND, MOST, TOUCHED) = range(10)
 """Places in `numbers`: entries in the heap, inconsistent states, expansions so far, the goal's state, epsilon as a
-fraction, bits of a state in an entry, which round this is (1 to 127), expansions of this call, states seen."""
+fraction, bits of a state in an entry, which round this is (1 to 127), what g + h has to stay below, states seen."""
 WAITS = 128
 """Set in a state's round while it waits in the list of inconsistent states."""
 
@@ -42,10 +42,12 @@ def improve(
     cells_first: Int,
     cells: Int,
     rank: Byte,
+    target: Int,
     cost: Byte,
     blocked: int,
     bins: int,
     toward: Int,
+    turning: Int,
     room: Int,
     seen: Short,
     heap: Long,
@@ -73,7 +75,9 @@ def improve(
         cost: (cells,) of the grid with its border.
         blocked: cost from which a cell is not to be entered.
         bins: of heading and articulation together.
-        toward: (cells,) lower bound h of the cost to the goal; LIMIT: there is no way.
+        toward: (cells,) lower bound of the cost to the goal's cell; LIMIT: there is no way.
+        turning: (bins,) what is added to it for heading and articulation.
+        target: (m,) bin that each move ends in.
         room: (states,) LIMIT - g.
         seen: (states,) low byte: the rank of the move that it was reached by; high byte: the round in which it was
             expanded last, and WAITS.
@@ -90,7 +94,7 @@ def improve(
     size, wait = numbers[HEAP], numbers[WAITING]
     goal, shift, round_ = numbers[GOAL], numbers[SHIFT], numbers[ROUND]
     numerator, denominator = numbers[NUMERATOR], numbers[DENOMINATOR]
-    mask = (np.int64(1) << shift) - 1
+    mask, most = (np.int64(1) << shift) - 1, numbers[MOST]
     moves_most = 0
     for b in range(bins):
         moves_most = max(moves_most, first[b + 1] - first[b])
@@ -126,7 +130,7 @@ def improve(
             dearest = max(source, np.int64(cost[end]))
             if dearest >= blocked:
                 continue
-            ahead = np.int64(toward[end])
+            ahead = np.int64(toward[end]) + np.int64(turning[target[m]])
             if ahead >= LIMIT:
                 continue
             there = state + step[m]
@@ -144,7 +148,7 @@ def improve(
                 continue
             if shaped and not is_free(here, m, stride, shape, pieces_first, pieces, levels, free, known):
                 continue
-            if total >= LIMIT:
+            if total + ahead >= most:
                 status = TOO_COSTLY
                 continue
             if before == LIMIT:
@@ -165,13 +169,20 @@ def improve(
             break
     numbers[HEAP], numbers[WAITING] = size, wait
     numbers[EXPANDED] += expanded
-    numbers[SPENT] = expanded
     return status
 
 
 @njit(cache=True)
 def next_round(
-    bins: int, toward: Int, room: Int, seen: Short, heap: Long, waiting: Long, numbers: Long, numerator: int
+    bins: int,
+    toward: Int,
+    turning: Int,
+    room: Int,
+    seen: Short,
+    heap: Long,
+    waiting: Long,
+    numbers: Long,
+    numerator: int,
 ) -> int:
     """Make one heap of the open and the inconsistent states, for another epsilon.
 
@@ -191,7 +202,8 @@ def next_round(
         state = entry & mask
         if (seen[state] >> 8) & 127 == round_:
             continue
-        g, h = LIMIT - np.int64(room[state]), np.int64(toward[state // bins])
+        g = LIMIT - np.int64(room[state])
+        h = np.int64(toward[state // bins]) + np.int64(turning[state % bins])
         if entry >> shift != denominator * g + old * h or g + h >= best:
             continue
         heap[count] = ((denominator * g + numerator * h) << shift) | state
@@ -200,7 +212,8 @@ def next_round(
     for k in range(numbers[WAITING]):
         state = waiting[k]
         seen[state] &= np.uint16(0xFFFF ^ (WAITS << 8))
-        g, h = LIMIT - np.int64(room[state]), np.int64(toward[state // bins])
+        g = LIMIT - np.int64(room[state])
+        h = np.int64(toward[state // bins]) + np.int64(turning[state % bins])
         if g + h >= best:
             continue
         heap[count] = ((denominator * g + numerator * h) << shift) | state

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from pbrl_control.settings import Positive, Section
 
-DENOMINATOR = 100
-"""Epsilons are whole hundredths."""
 ROUNDS = 120
 
 
@@ -30,7 +29,7 @@ class LatticeSettings(Section):
     last_epsilon: Annotated[float, Field(ge=1.0, le=1000.0)] = 1.0
     epsilon_step: Annotated[float, Field(ge=0.01, le=1000.0)] = 0.2
     time_limit: Positive = 10.0
-    direction: Literal["forward", "backward"] = "forward"
+    direction: Literal["forward", "backward"] = "backward"
     expansions: Annotated[int, Field(ge=1)] = 10**12
 
     @model_validator(mode="after")
@@ -42,9 +41,16 @@ class LatticeSettings(Section):
         return self
 
     @property
-    def numerators(self) -> list[int]:
-        """The epsilons in hundredths, from the first to the last."""
-        begin, end, step = (
-            round(value * DENOMINATOR) for value in (self.epsilon, self.last_epsilon, self.epsilon_step)
-        )
+    def _hundredths(self) -> list[int]:
+        begin, end, step = (round(100 * value) for value in (self.epsilon, self.last_epsilon, self.epsilon_step))
         return [*range(begin, end, -step), end]
+
+    @property
+    def denominator(self) -> int:
+        """What `numerators` are over: as small as can be."""
+        return 100 // math.gcd(100, *self._hundredths)
+
+    @property
+    def numerators(self) -> list[int]:
+        """The epsilons times `denominator`, from the first to the last."""
+        return [value * self.denominator // 100 for value in self._hundredths]

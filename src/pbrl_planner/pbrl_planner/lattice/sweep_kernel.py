@@ -49,20 +49,47 @@ def is_free(
     column = here - row * stride
     word, bit = column >> 6, np.uint64(column & 63)
     if not known[row, word, m]:
-        taken = np.uint64(0)
         top, left = row + shape[0], (word << 6) + shape[1]
-        for k in range(pieces_first[m], pieces_first[m + 1]):
-            at = left + pieces[k, 1]
-            line = levels[pieces[k, 2], top + pieces[k, 0]]
-            low, rest = at >> 6, np.uint64(at & 63)
-            taken |= line[low] >> rest
-            # Shifted in two steps: a shift by 64 is undefined.
-            taken |= (line[low + 1] << np.uint64(1)) << (np.uint64(63) - rest)
-            if taken == ALL:
-                break
-        free[row, word, m] = ~taken
+        free[row, word, m] = ~taken_word(top, left, pieces[pieces_first[m] : pieces_first[m + 1]], levels)
         known[row, word, m] = 1
     return (free[row, word, m] >> bit) & np.uint64(1) != 0
+
+
+@njit(cache=True)
+def taken_word(top: int, left: int, pieces: Int, levels: Word) -> int:
+    """Return the bits of where a sweep, begun at 64 places side by side, would meet something.
+
+    Args:
+        top, left: row and first column of those places in the bits of the floor.
+        pieces: (p, 3) row and first cell relative to them, level.
+        levels: (levels, rows, words) bits of the floor.
+    """
+    taken = np.uint64(0)
+    for k in range(len(pieces)):
+        at = left + pieces[k, 1]
+        low, rest = at >> 6, np.uint64(at & 63)
+        level, row = pieces[k, 2], top + pieces[k, 0]
+        taken |= levels[level, row, low] >> rest
+        # Shifted in two steps: a shift by 64 is undefined.
+        taken |= (levels[level, row, low + 1] << np.uint64(1)) << (np.uint64(63) - rest)
+        if taken == ALL:
+            break
+    return taken
+
+
+@njit(cache=True)
+def shut_words(shape: Int, pieces_first: Int, pieces: Int, levels: Word, out: Word) -> None:
+    """Write the bits (rows, words) of the cells where every one of several outlines would meet something."""
+    for row in range(out.shape[0]):
+        for word in range(out.shape[1]):
+            shut = ALL
+            for k in range(len(pieces_first) - 1):
+                shut &= taken_word(
+                    row + shape[0], (word << 6) + shape[1], pieces[pieces_first[k] : pieces_first[k + 1]], levels
+                )
+                if shut == 0:
+                    break
+            out[row, word] = shut
 
 
 @njit(cache=True)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_planner.lattice.sweep_kernel import shut_words
+
 Int = NDArray[np.int32]
 Word = NDArray[np.uint64]
 Mask = NDArray[np.bool_]
@@ -109,16 +111,9 @@ def cut_up(mask: Mask, dx: int = 0, dy: int = 0) -> Int:
     return np.concatenate((one, two[lengths != 1 << level])).astype(np.int32)
 
 
-def overlaps(mask: Mask, floor: Floor, rows: int, columns: int) -> Mask:
-    """Return where (rows, columns) on the search's grid a mask, its middle there, would touch something."""
-    reach = len(mask) // 2
-    if reach > floor.border:
-        raise ValueError(f"expected a mask within the floor's border of {floor.border} cells, got {reach}")
-    sums = np.zeros((floor.taken.shape[0], floor.taken.shape[1] + 1), dtype=np.int32)
-    np.cumsum(floor.taken, axis=1, out=sums[:, 1:])
-    found = np.zeros((rows, columns), dtype=bool)
-    edges = np.diff(np.pad(mask.astype(np.int8), ((0, 0), (1, 1))), axis=1)
-    for row, begin, end in zip(*np.nonzero(edges == 1), np.nonzero(edges == -1)[1], strict=True):
-        top, left, right = (floor.border - reach + int(value) for value in (row, begin, end))
-        found |= sums[top : top + rows, right : right + columns] > sums[top : top + rows, left : left + columns]
-    return found
+def shut_cells(cut: list[Int], floor: Floor, rows: int, columns: int) -> Mask:
+    """Return where (rows, columns) on the search's grid each of several outlines, cut up, would meet something."""
+    first = np.concatenate(([0], np.cumsum([len(each) for each in cut]))).astype(np.int32)
+    words = np.zeros((rows, -(-columns // WORD)), dtype=np.uint64)
+    shut_words(np.full(2, floor.border, dtype=np.int32), first, np.concatenate(cut), floor.levels, words)
+    return np.unpackbits(words.view(np.uint8), axis=1, count=columns, bitorder="little").astype(bool)
