@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely.geometry import Polygon
+from shapely.geometry import Point, Polygon
 
 from pbrl_control.errors import ControlError
 from pbrl_control.navigation.floor_map import as_polygon
@@ -85,6 +85,12 @@ class ArticulatedBody:
         return reach
 
     @property
+    def inner_radius(self) -> float:
+        """Of the circle about the robot's centre that it covers however it turns [m]; 0: its centre is outside of it."""
+        outline, centre = Polygon(self.robot), Point(0.0, 0.0)
+        return float(outline.exterior.distance(centre)) if outline.contains(centre) else 0.0
+
+    @property
     def cart_middle(self) -> Array | None:
         """The middle (2,) of the cart in its frame [m]; None without one."""
         return None if self.cart is None else np.array(Polygon(self.cart).centroid.coords[0])
@@ -129,7 +135,7 @@ class ArticulatedBody:
             (2 r + 1, 2 r + 1), rows along y, large enough for all of it. All cells that are touched are in it; a cell
             can be in it that is missed by a quarter of a cell.
         """
-        fine = self._fine(np.asarray(poses, dtype=float), resolution * FINE)
+        fine = self.between(np.asarray(poses, dtype=float), resolution * FINE)
         outlines = self.outlines(fine)
         away = float(np.abs(fine[:, :2]).max()) + self.radius
         reach = math.ceil(away / resolution) + 2
@@ -141,8 +147,8 @@ class ArticulatedBody:
                 cover_all(np.ascontiguousarray(rings[:, piece]), resolution, 0.5 * FINE * resolution, reach, found)
         return found.astype(bool)
 
-    def _fine(self, poses: Array, most: float) -> Array:
-        """Return poses between which no corner moves further than `most` [m]."""
+    def between(self, poses: Array, most: float) -> Array:
+        """Return poses (n, 4) with more between them, so that no corner moves further than `most` [m] to the next."""
         corners = np.concatenate(list(self.outlines(poses).values()), axis=1)
         moved = np.hypot(*np.diff(corners, axis=0).transpose(2, 0, 1)).max(axis=1)
         # A corner's arc is longer than its chord: a little more than what would do on a straight line.

@@ -17,7 +17,7 @@ from pbrl_control.planar import Array, rotation
 from pbrl_control.settings import Positive, Section
 from pbrl_planner.lattice.primitives import TURN, Primitive, PrimitiveSet
 
-POSES = 11
+POSES = 10  # none of them halfway, where what is mirrored would be in another cell
 DIGITS = 6  # of a pose, as in a file
 Whole = Annotated[int, Field(ge=1, le=100)]
 

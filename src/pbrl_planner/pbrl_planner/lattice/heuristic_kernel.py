@@ -24,11 +24,11 @@ def cell_costs(
         base: (m,) its cost on floor of cost 0.
         cells_first: (m + 1,) where each move's cells begin.
         cells: that it crosses, without source and end, relative to its source.
-        limit: as good as infinite.
+        limit: as good as infinite; costs have to stay below.
         out: (cells,) to be written.
 
     Returns:
-        Cells that can reach the goal, itself included.
+        Cells that can reach the goal, itself included; -1: a cost came to the limit, so that nothing is known.
     """
     out[:] = limit
     if cost[goal] >= blocked:
@@ -59,12 +59,16 @@ def cell_costs(
             if dearest >= blocked:
                 continue
             known = out[source]
-            if now + base[m] * (1 + dearest) >= known:
+            if known < limit and now + base[m] * (1 + dearest) >= known:
                 continue
             for k in range(cells_first[m], cells_first[m + 1]):
                 dearest = max(dearest, np.int64(cost[source + cells[k]]))
             total = now + base[m] * (1 + dearest)
-            if dearest >= blocked or total >= known:
+            if dearest >= blocked:
+                continue
+            if total >= limit:
+                return -1
+            if total >= known:
                 continue
             if known < limit:
                 if before[source] >= 0:

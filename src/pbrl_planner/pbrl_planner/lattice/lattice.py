@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from pbrl_control.planar import Array
 from pbrl_planner.errors import PlannerError
@@ -16,10 +17,12 @@ from pbrl_planner.lattice.grid import CostGrid
 from pbrl_planner.lattice.moves import MoveTables, Relaxed, moves_of, reach_of, relax
 from pbrl_planner.lattice.primitives import TURN, Pace, PrimitiveSet
 from pbrl_planner.lattice.search_kernel import LIMIT
-from pbrl_planner.lattice.sweeps import Floor, Sweeps, cut_up, shut_cells
+from pbrl_planner.lattice.sweeps import Floor, Sweeps, cut_up
 
 SAME = 1e-6  # of a resolution, relative, by which two count as one
 MOST_STATES = 1 << 30
+DEAREST_MOVE = 1 << 18
+"""Cost of a primitive on floor of cost 0 at most: four minutes. The lower bound keeps a bucket for each cost of an edge."""
 BORDER = 255
 """Cost of the cells around the map."""
 State = tuple[int, int, int, int]
@@ -34,19 +37,31 @@ class Motions:
         primitives: the motions.
         pace: speeds, which make the costs.
         body: outlines of robot and cart; None: a point moves, and the floor's costs say where it may be.
+        costs: (p,) of the primitives on floor of cost 0, whole numbers above zero; None: their times.
 
     Raises:
-        PlannerError: there are articulations but no cart.
+        PlannerError: there are articulations but no cart, or costs are not what they should be.
     """
 
     def __init__(
-        self, primitives: PrimitiveSet, pace: Pace | None = None, body: ArticulatedBody | None = None
+        self,
+        primitives: PrimitiveSet,
+        pace: Pace | None = None,
+        body: ArticulatedBody | None = None,
+        costs: NDArray[np.int64] | None = None,
     ) -> None:
         if len(primitives.articulations) > 1 and (body is None or body.cart is None):
             raise PlannerError("body: expected one with a cart, since the primitives have articulations, got none")
         self.primitives, self.body, self.pace = primitives, body, pace or Pace()
-        self.costs = primitives.base_costs(self.pace)
+        self.costs = primitives.base_costs(self.pace) if costs is None else np.asarray(costs)
+        shaped = self.costs.shape == (len(primitives.primitives),) and self.costs.dtype.kind == "i"
+        if not shaped or self.costs.min(initial=1) < 1 or self.costs.max() > DEAREST_MOVE:
+            raise PlannerError(
+                f"costs: expected {len(primitives.primitives)} whole numbers from 1 to {DEAREST_MOVE}, got "
+                f"{self.costs.dtype} {self.costs.shape}, at most {self.costs.max(initial=0)}; lower multipliers or raise speeds"
+            )
         self.moves = moves_of(primitives, self.costs, body)
+        self._cut: dict[str, list[NDArray[np.int32]]] = {}
 
     @cached_property
     def relaxed(self) -> Relaxed:
@@ -60,14 +75,12 @@ class Motions:
             return []
         return [self.body.mask(each.poses, self.primitives.resolution) for each in self.primitives.primitives]
 
-    @cached_property
-    def stances(self) -> list[NDArray[np.int32]]:
-        """Cells that the body covers at each heading and articulation, cut up; none for a point."""
-        if self.body is None:
-            return []
-        turns = np.arange(self.primitives.headings) * TURN / self.primitives.headings
-        poses = [np.array([[0.0, 0.0, turn, phi]]) for turn in turns for phi in self.primitives.articulations]
-        return [cut_up(self.body.mask(pose, self.primitives.resolution)) for pose in poses]
+    def cut(self, direction: Literal["forward", "backward"]) -> list[NDArray[np.int32]]:
+        """Return each primitive's sweep, cut up, as seen from where a search comes to it: its start or its end."""
+        if direction not in self._cut:
+            ends = [each.end[:2] if direction == "backward" else (0, 0) for each in self.primitives.primitives]
+            self._cut[direction] = [cut_up(mask, *end) for mask, end in zip(self.masks, ends, strict=True)]
+        return self._cut[direction]
 
 
 class Lattice:
@@ -123,20 +136,21 @@ class Lattice:
         return self._sweeps[direction]
 
     def _new_sweeps(self, direction: Literal["forward", "backward"]) -> Sweeps:
-        cut = []
-        for number in self.tables(direction).primitive:
-            dx, dy = self.primitives.primitives[number].end[:2] if direction == "backward" else (0, 0)
-            cut.append(cut_up(self.motions.masks[number], dx, dy))
-        return Sweeps.of(cut, self._floor, *self.cost.shape)
+        cut = self.motions.cut(direction)
+        return Sweeps.of([cut[number] for number in self.tables(direction).primitive], self._floor, *self.cost.shape)
+
+    @cached_property
+    def _taken(self) -> NDArray[np.bool_]:
+        found = np.ones(self.cost.shape, dtype=bool)
+        rows, columns = self.grid.cells.shape
+        inside = (slice(self.border, self.border + rows), slice(self.border, self.border + columns))
+        found[inside] = self.grid.cells >= self.grid.lethal
+        return found
 
     @cached_property
     def _floor(self) -> Floor:
-        taken = np.ones(self.cost.shape, dtype=bool)
-        rows, columns = self.grid.cells.shape
-        inside = (slice(self.border, self.border + rows), slice(self.border, self.border + columns))
-        taken[inside] = self.grid.cells >= self.grid.lethal
         # Twice: searched from the goal, a sweep is seen from where it ends.
-        return Floor.of(taken, 2 * max(len(mask) // 2 for mask in self.motions.masks))
+        return Floor.of(self._taken, 2 * max(len(mask) // 2 for mask in self.motions.masks))
 
     def floor_tables(self, direction: Literal["forward", "backward"]) -> MoveTables:
         """Return the moves of the lower bound on the floor: to the goal, or to the start from everywhere."""
@@ -158,10 +172,12 @@ class Lattice:
 
     @cached_property
     def floor_cost(self) -> NDArray[np.uint8]:
-        """Costs for the lower bound: closed, too, where the body meets something however it is turned and articulated."""
+        """Costs for the lower bound: closed, too, where something stands nearer than the robot's sides ever are."""
         found = self.cost.copy()
         if self.body is not None:
-            found[shut_cells(self.motions.stances, self._floor, *self.cost.shape)] = BORDER
+            # The centre crosses a cell anywhere, not only in its middle.
+            near = self.body.inner_radius - math.sqrt(0.5) * self.grid.resolution
+            found[distance_transform_edt(~self._taken) * self.grid.resolution < near] = BORDER
         return np.ascontiguousarray(found.ravel())
 
     def fault(self, state: State) -> str:

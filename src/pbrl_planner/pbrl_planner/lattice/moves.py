@@ -123,8 +123,9 @@ def _ints(values: object) -> Int:
 
 
 def reach_of(moves: list[Move]) -> int:
-    """Return how many cells along an axis any move looks away from its source."""
-    return max(max(abs(x), abs(y)) for move in moves for x, y in (*move.dear, (move.dx, move.dy)))
+    """Return how many cells along an axis any move looks away from its source, or from its target."""
+    seen = [(move, x, y) for move in moves for x, y in (*move.dear, (move.dx, move.dy))]
+    return max(max(abs(x), abs(y), abs(x - move.dx), abs(y - move.dy)) for move, x, y in seen)
 
 
 @dataclass(frozen=True)

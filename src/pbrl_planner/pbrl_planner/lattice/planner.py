@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pbrl_control.planar import Array
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.lattice import search_kernel as kernel
-from pbrl_planner.lattice.heuristic_kernel import cell_costs
+from pbrl_planner.lattice.lower_bound import LowerBound
 from pbrl_planner.lattice.plan import Improvement, LatticePlan
 from pbrl_planner.lattice.problem import LatticeProblem
 from pbrl_planner.lattice.settings import LatticeSettings
@@ -63,30 +63,20 @@ class _Search:
         self._best: tuple[int, NDArray[np.int64]] | None = None
         self._epsilon, self._least = math.inf, 1
         self._bins = lattice.primitives.bins
-        self._toward = np.empty(lattice.cells, dtype=np.int32)
-        floor = lattice.floor_tables(settings.direction)
-        cell_costs(
-            lattice.floor_cost,
-            lattice.grid.blocked,
-            self._goal // self._bins,
-            floor.cell_step,
-            floor.base,
-            floor.cells_first,
-            floor.cells,
-            kernel.LIMIT,
-            self._toward,
-        )
-        self._turning = lattice.turning(self._goal % self._bins, settings.direction)
+        self._bound = LowerBound.of(lattice, self._goal, settings.direction)
         self._to_bound = self._elapsed()
-        self._room = np.zeros(lattice.cells * self._bins, dtype=np.int32)
-        self._seen = np.zeros(lattice.cells * self._bins, dtype=np.uint16)
+        self._records = np.zeros(lattice.cells * self._bins, dtype=np.int64)
         self._heap = np.empty(ROOM, dtype=np.int64)
         self._waiting = np.empty(ROOM, dtype=np.int64)
         self._numbers = np.zeros(10, dtype=np.int64)
 
     def run(self) -> LatticePlan:
         """Lower epsilon round by round."""
-        if self._bound(self._root) >= kernel.LIMIT:
+        if self._root == self._goal:
+            self._best, self._epsilon = (0, np.zeros(0, dtype=np.int64)), 1.0
+            self._tell()
+            return self._result(False, "")
+        if self._bound.at(self._root) >= kernel.LIMIT:
             return self._result(True, "there is no way for the robot's centre, or none to turn so, whatever it does")
         numerators = self._settings.numerators
         self._open(numerators[0])
@@ -101,10 +91,6 @@ class _Search:
             if self._tell() or place >= len(numerators):
                 return self._result(False, "")
 
-    def _bound(self, state: int) -> int:
-        """Return the lower bound h of the cost from a state to the goal."""
-        return int(self._toward[state // self._bins]) + int(self._turning[state % self._bins])
-
     def _open(self, numerator: int) -> None:
         shift = int(self._lattice.cells * self._bins).bit_length()
         numbers = self._numbers
@@ -112,9 +98,9 @@ class _Search:
         numbers[kernel.DENOMINATOR] = self._settings.denominator
         numbers[kernel.SHIFT], numbers[kernel.ROUND] = shift, 1
         numbers[kernel.MOST] = min(kernel.LIMIT, (1 << (62 - shift)) // numerator)
-        self._room[self._root] = kernel.LIMIT
+        self._records[self._root] = kernel.LIMIT << 16
         numbers[kernel.TOUCHED] = 1
-        self._heap[0] = ((numerator * self._bound(self._root)) << shift) | self._root
+        self._heap[0] = ((numerator * self._bound.at(self._root)) << shift) | self._root
         numbers[kernel.HEAP] = 1
 
     def _round(self) -> int:
@@ -137,10 +123,9 @@ class _Search:
                 cost,
                 lattice.grid.blocked,
                 self._bins,
-                self._toward,
-                self._turning,
-                self._room,
-                self._seen,
+                self._bound.toward,
+                self._bound.turning,
+                self._records,
                 self._heap,
                 self._waiting,
                 self._numbers,
@@ -167,7 +152,7 @@ class _Search:
         moves, cost = self._way()
         self._best = (cost, moves)
         # What is ahead of the goal on its way may have got cheaper since the goal was reached from there.
-        self._room[self._goal] = kernel.LIMIT - cost
+        self._records[self._goal] = ((kernel.LIMIT - cost) << 16) | (int(self._records[self._goal]) & 0xFFFF)
         while True:
             place += 1
             entries = int(self._numbers[kernel.HEAP] + self._numbers[kernel.WAITING])
@@ -176,10 +161,9 @@ class _Search:
             numerator = numerators[min(place, len(numerators) - 1)]
             least = kernel.next_round(
                 self._bins,
-                self._toward,
-                self._turning,
-                self._room,
-                self._seen,
+                self._bound.toward,
+                self._bound.turning,
+                self._records,
                 self._heap,
                 self._waiting,
                 self._numbers,
@@ -197,7 +181,7 @@ class _Search:
         """Return the primitives (k,) from start to goal and what they cost together."""
         tables, state, found = self._tables, self._goal, []
         while state != self._root:
-            m = tables.into[state % self._bins][int(self._seen[state]) & 255]
+            m = tables.into[state % self._bins][int(self._records[state]) & 255]
             found.append(int(tables.primitive[m]))
             state -= int(tables.step[m])
         primitives = np.array(found, dtype=np.int64)

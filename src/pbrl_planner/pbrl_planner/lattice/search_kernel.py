@@ -1,8 +1,8 @@
 """Compiled: one round of ARA* (Likhachev et al.; thesis 4.5.4) over a lattice in flat arrays, to be gone on with.
 
 States are numbered cell * bins + bin, on a grid with a border of blocked cells, so that a move is one addition and no
-move needs a test of the map's edge. `room` is LIMIT - g, hence 0 where a state was never seen: large arrays then cost
-nothing until they are touched. Keys are `denominator * g + numerator * h`, whole numbers, so that the bound of
+move needs a test of the map's edge. A state's record is one number, LIMIT - g in its upper bits, hence 0 where it was never
+seen: large arrays then cost nothing until they are touched. Keys are `denominator * g + numerator * h`, whole numbers, so that the bound of
 epsilon = numerator / denominator holds to the last unit of cost.
 """
 
@@ -19,7 +19,6 @@ Long = NDArray[np.int64]
 Int = NDArray[np.int32]
 Word = NDArray[np.uint64]
 Byte = NDArray[np.uint8]
-Short = NDArray[np.uint16]
 
 LIMIT = 1 << 30
 """Costs end here."""
@@ -29,8 +28,8 @@ allowed are used up, the heap or the list of inconsistent states needs room, a c
 (HEAP, WAITING, EXPANDED, GOAL, NUMERATOR, DENOMINATOR, SHIFT, ROUND, MOST, TOUCHED) = range(10)
 """Places in `numbers`: entries in the heap, inconsistent states, expansions so far, the goal's state, epsilon as a
 fraction, bits of a state in an entry, which round this is (1 to 127), what g + h has to stay below, states seen."""
-WAITS = 128
-"""Set in a state's round while it waits in the list of inconsistent states."""
+WAITS = 1 << 15
+"""Set in a state's record while it waits in the list of inconsistent states."""
 
 
 @njit(cache=True)
@@ -48,8 +47,7 @@ def improve(
     bins: int,
     toward: Int,
     turning: Int,
-    room: Int,
-    seen: Short,
+    records: Long,
     heap: Long,
     waiting: Long,
     numbers: Long,
@@ -78,9 +76,8 @@ def improve(
         toward: (cells,) lower bound of the cost to the goal's cell; LIMIT: there is no way.
         turning: (bins,) what is added to it for heading and articulation.
         target: (m,) bin that each move ends in.
-        room: (states,) LIMIT - g.
-        seen: (states,) low byte: the rank of the move that it was reached by; high byte: the round in which it was
-            expanded last, and WAITS.
+        records: (states,) bits 0 to 7: the rank of the move that it was reached by; 8 to 14: the round in which it was
+            expanded last; 15: it waits in the list of inconsistent states; from 16: LIMIT - g.
         heap: of open states.
         waiting: inconsistent states: improved after they were expanded in this round.
         numbers: (10,) what is carried from call to call; places above.
@@ -102,7 +99,7 @@ def improve(
     shaped = len(shape) > 0
     expanded = 0
     status = BUDGET
-    best = LIMIT - room[goal]
+    best = LIMIT - (records[goal] >> 16)
     while expanded < allowed:
         if size == 0:
             status = EXHAUSTED if best == LIMIT else DONE
@@ -116,14 +113,14 @@ def improve(
             break
         size = heap_pop(heap, size)
         state = top & mask
-        mark = seen[state]
-        if (mark >> 8) & 127 == round_:
+        record = records[state]
+        if (record >> 8) & 127 == round_:
             continue
         here = state // bins
         b = state - here * bins
-        seen[state] = np.uint16((mark & 255) | (round_ << 8))
+        records[state] = (record & ~np.int64(0x7F00)) | (round_ << 8)
         expanded += 1
-        g = LIMIT - room[state]
+        g = LIMIT - (record >> 16)
         source = np.int64(cost[here])
         for m in range(first[b], first[b + 1]):
             end = here + cell_step[m]
@@ -134,7 +131,8 @@ def improve(
             if ahead >= LIMIT:
                 continue
             there = state + step[m]
-            before = LIMIT - np.int64(room[there])
+            old = records[there]
+            before = LIMIT - (old >> 16)
             unit = np.int64(base[m])
             total = g + unit * (1 + dearest)
             if total >= before or total + ahead >= best:
@@ -153,14 +151,12 @@ def improve(
                 continue
             if before == LIMIT:
                 numbers[TOUCHED] += 1
-            room[there] = np.int32(LIMIT - total)
-            mark = seen[there]
-            seen[there] = np.uint16((mark & 0xFF00) | rank[m])
+            records[there] = ((LIMIT - total) << 16) | (old & 0xFF00) | np.int64(rank[m])
             if there == goal:
                 best = total
-            if (mark >> 8) & 127 == round_:
-                if not (mark >> 8) & WAITS:
-                    seen[there] |= np.uint16(WAITS << 8)
+            if (old >> 8) & 127 == round_:
+                if not old & WAITS:
+                    records[there] |= WAITS
                     waiting[wait] = there
                     wait += 1
             else:
@@ -177,8 +173,7 @@ def next_round(
     bins: int,
     toward: Int,
     turning: Int,
-    room: Int,
-    seen: Short,
+    records: Long,
     heap: Long,
     waiting: Long,
     numbers: Long,
@@ -194,15 +189,16 @@ def next_round(
     denominator = numbers[DENOMINATOR]
     mask = (np.int64(1) << shift) - 1
     old = numbers[NUMERATOR]
-    best = LIMIT - np.int64(room[numbers[GOAL]])
+    best = LIMIT - (records[numbers[GOAL]] >> 16)
     least = np.int64(LIMIT)
     count = 0
     for k in range(numbers[HEAP]):
         entry = heap[k]
         state = entry & mask
-        if (seen[state] >> 8) & 127 == round_:
+        record = records[state]
+        if (record >> 8) & 127 == round_:
             continue
-        g = LIMIT - np.int64(room[state])
+        g = LIMIT - (record >> 16)
         h = np.int64(toward[state // bins]) + np.int64(turning[state % bins])
         if entry >> shift != denominator * g + old * h or g + h >= best:
             continue
@@ -211,8 +207,8 @@ def next_round(
         least = min(least, g + h)
     for k in range(numbers[WAITING]):
         state = waiting[k]
-        seen[state] &= np.uint16(0xFFFF ^ (WAITS << 8))
-        g = LIMIT - np.int64(room[state])
+        records[state] &= ~np.int64(WAITS)
+        g = LIMIT - (records[state] >> 16)
         h = np.int64(toward[state // bins]) + np.int64(turning[state % bins])
         if g + h >= best:
             continue

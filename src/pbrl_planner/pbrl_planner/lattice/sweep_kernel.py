@@ -78,21 +78,6 @@ def taken_word(top: int, left: int, pieces: Int, levels: Word) -> int:
 
 
 @njit(cache=True)
-def shut_words(shape: Int, pieces_first: Int, pieces: Int, levels: Word, out: Word) -> None:
-    """Write the bits (rows, words) of the cells where every one of several outlines would meet something."""
-    for row in range(out.shape[0]):
-        for word in range(out.shape[1]):
-            shut = ALL
-            for k in range(len(pieces_first) - 1):
-                shut &= taken_word(
-                    row + shape[0], (word << 6) + shape[1], pieces[pieces_first[k] : pieces_first[k + 1]], levels
-                )
-                if shut == 0:
-                    break
-            out[row, word] = shut
-
-
-@njit(cache=True)
 def cover_all(rings: Array, resolution: float, margin: float, reach: int, mask: Byte) -> None:
     """Mark the cells that any of several convex outlines (n, k, 2) touches; see `cover`."""
     for k in range(len(rings)):

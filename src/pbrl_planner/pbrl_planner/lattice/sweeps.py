@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_planner.lattice.sweep_kernel import shut_words
-
 Int = NDArray[np.int32]
 Word = NDArray[np.uint64]
 Mask = NDArray[np.bool_]
@@ -109,11 +107,3 @@ def cut_up(mask: Mask, dx: int = 0, dy: int = 0) -> Int:
     one = np.stack((row, left, level), axis=1)
     two = np.stack((row, left + lengths - (1 << level), level), axis=1)
     return np.concatenate((one, two[lengths != 1 << level])).astype(np.int32)
-
-
-def shut_cells(cut: list[Int], floor: Floor, rows: int, columns: int) -> Mask:
-    """Return where (rows, columns) on the search's grid each of several outlines, cut up, would meet something."""
-    first = np.concatenate(([0], np.cumsum([len(each) for each in cut]))).astype(np.int32)
-    words = np.zeros((rows, -(-columns // WORD)), dtype=np.uint64)
-    shut_words(np.full(2, floor.border, dtype=np.int32), first, np.concatenate(cut), floor.levels, words)
-    return np.unpackbits(words.view(np.uint8), axis=1, count=columns, bitorder="little").astype(bool)
