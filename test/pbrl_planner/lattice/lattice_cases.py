@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -17,11 +18,13 @@ PAD = 30
 SMALL = ArticulatedBody(rectangle(-0.16, 0.16, 0.16), rectangle(0.0, 0.4, 0.13), (0.22, 0.0))
 
 
+@cache
 def point_motions(headings: int = 8, stride: int = 3) -> Motions:
     chosen = GeneratorSettings(resolution=CELL, headings=headings, articulations=1, stride=stride)
     return Motions(generate(chosen), Pace())
 
 
+@cache
 def cart_motions(articulations: int = 3) -> Motions:
     chosen = GeneratorSettings(resolution=CELL, headings=8, articulations=articulations, stride=2)
     return Motions(generate(chosen), Pace(), SMALL)
