@@ -13,6 +13,7 @@ from pbrl_control.navigation.floor_map import FloorMap
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.lattice import (
     CostGrid,
+    Environment,
     GeneratorSettings,
     Lattice,
     LatticeProblem,
@@ -25,6 +26,8 @@ from pbrl_planner.lattice import (
     read_primitives,
     write_primitives,
 )
+from pbrl_planner.lattice.cfg_file import parse_environment
+from pbrl_planner.lattice.tokens import Tokens
 
 DATA = Path(__file__).resolve().parents[2] / "data/lattice"
 OPTIMAL = 119_407
@@ -88,7 +91,11 @@ def test_generated_primitives_come_back_from_their_file(tmp_path: Path, articula
     again = read_primitives(first)
     write_primitives(again, second)
     assert first.read_bytes() == second.read_bytes()
-    assert (again.resolution, again.headings, again.articulations) == (made.resolution, made.headings, made.articulations)
+    assert (again.resolution, again.headings, again.articulations) == (
+        made.resolution,
+        made.headings,
+        made.articulations,
+    )
     for a, b in zip(made.primitives, again.primitives, strict=True):
         assert (a.start, a.end, a.multiplier) == (b.start, b.end, b.multiplier)
         assert a.poses.tobytes() == b.poses.tobytes()
@@ -109,7 +116,11 @@ def test_a_third_party_s_primitives_come_back_too(tmp_path: Path) -> None:
         ("resolution_m: 0.1", "resolution_m: -1", r"line 1: expected resolution_m: a finite number above 0"),
         ("resolution_m: 0.1", "resolution_m: nan", r"line 1: expected resolution_m"),
         ("resolution_m: 0.1\n", "", r"line 1: expected resolution_m:, got 'numberofangles:'"),
-        ("numberofangles: 4", "numberofangles: 100000", r"line 2: expected numberofangles: a whole number from 1 to 256"),
+        (
+            "numberofangles: 4",
+            "numberofangles: 100000",
+            r"line 2: expected numberofangles: a whole number from 1 to 256",
+        ),
         ("primitives: 2", "primitives: 3", r"line 17: expected primID:, got the end of the file"),
         ("primitives: 2", "primitives: 99999999999999999999999", r"line 3: expected totalnumberofprimitives"),
         ("primitives: 2", "primitives: 1", r"line 11: expected the end after 1 primitives, got 'primID:'"),
@@ -120,7 +131,11 @@ def test_a_third_party_s_primitives_come_back_too(tmp_path: Path) -> None:
         ("endpose_c: 1 0 0", "endpose_c: 2 0 0", r"ends in line 10: expected the last pose at \(0.2, 0\) m"),
         ("endpose_c: 1 0 0", "endpose_c: 1 0 1", r"ends in line 10: expected the last pose to head 1.5708"),
         ("0.1 0.0 0.0", "0.1 0.0 inf", r"line 10: expected pose's heading: a finite number, got 'inf'"),
-        ("intermediateposes: 2\n0.0 0.0 0.0\n0.1", "intermediateposes: 3\n0.0 0.0 0.0\n0.1", r"line 11: expected pose's x"),
+        (
+            "intermediateposes: 2\n0.0 0.0 0.0\n0.1",
+            "intermediateposes: 3\n0.0 0.0 0.0\n0.1",
+            r"line 11: expected pose's x",
+        ),
         ("costmult: 2", "costmult: 0", r"line 7: expected additionalactioncostmult"),
         ("costmult: 2", "costmult: two", r"line 7: .*got 'two'"),
     ],
@@ -140,10 +155,7 @@ def test_an_environment_is_read() -> None:
     assert read_environment_of(CFG.replace("obsthresh", "NumThetaDirs: 8\nobsthresh", 1)).headings == 8
 
 
-def read_environment_of(text: str, folder: Path | None = None):  # noqa: ANN201
-    from pbrl_planner.lattice.cfg_file import parse_environment
-    from pbrl_planner.lattice.tokens import Tokens
-
+def read_environment_of(text: str) -> Environment:
     return parse_environment(Tokens(text, "bad.cfg"))
 
 
@@ -157,7 +169,11 @@ def read_environment_of(text: str, folder: Path | None = None):  # noqa: ANN201
         ("cells): 3 2", "cells): 0 2", r"line 1: expected discretization"),
         ("obsthresh: 254", "obsthresh: 256", r"line 2: expected obsthresh"),
         ("cost_inscribed_thresh: 253\n", "", r"line 3: expected cost_inscribed_thresh:, got"),
-        ("cellsize(meters): 0.5", "cellsize(meters): 0", r"line 5: expected cellsize\(meters\): a finite number above 0"),
+        (
+            "cellsize(meters): 0.5",
+            "cellsize(meters): 0",
+            r"line 5: expected cellsize\(meters\): a finite number above 0",
+        ),
         ("secs): 2.0", "secs): 0", r"line 7: expected timetoturn45degsinplace"),
         ("end(meters,rads): 1.2", "end(meters,rads): 1.6", r"expected end\(meters,rads\) on the map of 1.5 x 1 m"),
         ("start(meters,rads): 0.1", "start(meters,rads): -0.1", r"expected start\(meters,rads\) on the map"),
@@ -180,7 +196,13 @@ def test_files_that_are_no_text_are_refused(tmp_path: Path) -> None:
         read_primitives(tmp_path / "none.mprim")
 
 
-MAP = "image: map.{kind}\nresolution: 0.05\norigin: [-1.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+MAP = """image: map.{kind}
+resolution: 0.05
+origin: [-1.0, 2.0, 0.0]
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.25
+"""
 PIXELS = np.array([[254, 0, 205], [254, 254, 100], [0, 254, 150]], dtype=np.uint8)
 
 

@@ -6,15 +6,22 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from lattice_cases import CELL, Reference, cart_motions, free_state, point_motions, random_grid
 from pydantic import ValidationError
 
 from pbrl_planner.errors import PlannerError
-from pbrl_planner.lattice import CostGrid, Lattice, LatticePlan, LatticeProblem, LatticeSettings, Motions, plan
-from pbrl_planner.lattice import lower_bound
+from pbrl_planner.lattice import (
+    CostGrid,
+    Lattice,
+    LatticePlan,
+    LatticeProblem,
+    LatticeSettings,
+    Motions,
+    lower_bound,
+    plan,
+)
 from pbrl_planner.lattice.lower_bound import LowerBound
 from pbrl_planner.lattice.search_kernel import LIMIT
-
-from lattice_cases import CELL, Reference, cart_motions, free_state, point_motions, random_grid
 
 DIRECTIONS: tuple[Literal["forward", "backward"], ...] = ("forward", "backward")
 
@@ -142,7 +149,9 @@ def test_effort_is_used_again(points: Motions) -> None:
     problem = across(lattice)
     settings = LatticeSettings(epsilon=3.0, epsilon_step=0.25)
     at_once = sum(
-        plan(problem, LatticeSettings(epsilon=n / settings.denominator, last_epsilon=n / settings.denominator)).expansions
+        plan(
+            problem, LatticeSettings(epsilon=n / settings.denominator, last_epsilon=n / settings.denominator)
+        ).expansions
         for n in settings.numerators
     )
     assert plan(problem, settings).expansions < at_once

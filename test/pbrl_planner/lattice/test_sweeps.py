@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ ELL = np.array([[-0.3, -0.3], [0.3, -0.3], [0.3, 0.0], [0.0, 0.0], [0.0, 0.3], [
 
 def swept_by_shapely(body: ArticulatedBody, poses: np.ndarray) -> shapely.Geometry:
     share = np.linspace(0.0, 1.0, 60)[:, None]
-    fine = np.concatenate([a + (b - a) * share for a, b in zip(poses, poses[1:], strict=False)])
+    fine = np.concatenate([a + (b - a) * share for a, b in pairwise(poses)])
     rings = [shapely.polygons(each) for each in body.outlines(fine).values()]
     return shapely.union_all([part for each in rings for part in each])
 
@@ -35,7 +36,9 @@ def test_a_sweep_is_what_shapely_says_and_hardly_more(body: ArticulatedBody) -> 
         mask = body.mask(poses, cell)
         reach = len(mask) // 2
         y, x = np.nonzero(np.ones_like(mask))
-        boxes = shapely.box((x - reach - 0.5) * cell, (y - reach - 0.5) * cell, (x - reach + 0.5) * cell, (y - reach + 0.5) * cell)
+        boxes = shapely.box(
+            (x - reach - 0.5) * cell, (y - reach - 0.5) * cell, (x - reach + 0.5) * cell, (y - reach + 0.5) * cell
+        )
         true = swept_by_shapely(body, poses)
         shapely.prepare(true)
         touched = shapely.intersects(true, boxes).reshape(mask.shape)

@@ -56,12 +56,13 @@ def turn_into_door(corridor: float) -> Office:
     return Office(grid, (1.2, begin - 0.05, 0.0, 0.0), (middle, end, math.pi / 2.0, 0.0), corridor)
 
 
-def random_office(corridor: float, rng: np.random.Generator) -> Office:
+def random_office(corridor: float, rng: np.random.Generator, door: int = DOOR) -> Office:
     """Return a corridor between two rows of rooms with a door and desks each, start in it and goal in one of them.
 
     Args:
         corridor: width of it [m].
         rng: of doors, desks, start and goal.
+        door: width of each [cells].
     """
     rooms, room_width, depth = 3, 4.0, 3.6
     width, height = rooms * room_width, 2 * depth + corridor
@@ -74,11 +75,11 @@ def random_office(corridor: float, rng: np.random.Generator) -> Office:
             left = _cells(room * room_width)
             if room:
                 occupied[: low if row < 0 else None, left : left + WALL][0 if row < 0 else high :] = True
-            door = left + _cells(rng.uniform(1.2, room_width - 1.2 - DOOR * CELL))
+            jamb = left + _cells(rng.uniform(1.2, room_width - 1.2 - door * CELL))
             wall = low - WALL if row < 0 else high
-            occupied[wall : wall + WALL, door : door + DOOR] = False
-            _furnish(occupied, left, _cells(room_width), low if row < 0 else high, row, door, rng)
-            middle = (door + DOOR / 2) * CELL
+            occupied[wall : wall + WALL, jamb : jamb + door] = False
+            _furnish(occupied, left, _cells(room_width), low if row < 0 else high, row, jamb + door // 2, rng)
+            middle = (jamb + door / 2) * CELL
             inside = (low * CELL - 0.9) if row < 0 else ((high + WALL) * CELL + 0.7)
             goals.append((middle, inside, row * math.pi / 2.0, 0.0))
     start = (rng.uniform(0.8, width - 2.2), (low + high) / 2.0 * CELL, 0.0, 0.0)
@@ -95,7 +96,7 @@ def _furnish(
         long, deep = (_cells(1.5), _cells(0.75)) if rng.random() < 0.5 else (_cells(0.75), _cells(1.5))
         x = left + WALL + int(rng.integers(max(1, width - 2 * WALL - long)))
         away = int(rng.integers(_cells(3.4) - deep))
-        beside = x > door + DOOR + clear // 4 or x + long < door - clear // 4
+        beside = x > door + clear // 2 or x + long < door - clear // 2
         if not beside and away < clear + WALL:
             continue
         y = door_row + WALL + away if row > 0 else door_row - WALL - away - deep

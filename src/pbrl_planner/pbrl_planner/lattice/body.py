@@ -72,7 +72,7 @@ class ArticulatedBody:
             rectangle(-PR2_HALF, PR2_HALF, PR2_HALF),
             rectangle(0.0, length, width / 2.0),
             (PR2_GRIP, 0.0),
-            aside + [PR2_HALF - 0.05, 0.0],
+            aside + np.array([PR2_HALF - 0.05, 0.0]),
             aside,
         )
 
@@ -86,7 +86,7 @@ class ArticulatedBody:
 
     @property
     def inner_radius(self) -> float:
-        """Of the circle about the robot's centre that it covers however it turns [m]; 0: its centre is outside of it."""
+        """Of the circle about the robot's centre that it covers however it turns [m]; 0: the centre is outside."""
         outline, centre = Polygon(self.robot), Point(0.0, 0.0)
         return float(outline.exterior.distance(centre)) if outline.contains(centre) else 0.0
 

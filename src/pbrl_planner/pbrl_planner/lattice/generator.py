@@ -96,9 +96,7 @@ def _kinds(chosen: GeneratorSettings) -> list[_Kind]:
     return kinds
 
 
-def _primitive(
-    chosen: GeneratorSettings, bends: tuple[float, ...], heading: int, phi: int, kind: _Kind
-) -> Primitive:
+def _primitive(chosen: GeneratorSettings, bends: tuple[float, ...], heading: int, phi: int, kind: _Kind) -> Primitive:
     step = TURN / chosen.headings
     if kind.turned and kind.ahead:
         way = _arc(heading * step, kind.turned * step, kind.ahead)

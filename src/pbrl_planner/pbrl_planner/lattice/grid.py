@@ -84,7 +84,7 @@ class CostGrid:
         near: float = 0.0,
         nearest: int = 20,
     ) -> Self:
-        """Make a grid whose cost falls from what stands there to nothing (thesis 4.5.3: near obstacles edges cost more).
+        """Make a grid whose cost falls from what stands there to nothing (thesis 4.5.3: edges near it cost more).
 
         Args:
             occupied: (rows, columns) where something stands.
@@ -143,5 +143,3 @@ class CostGrid:
             parts = [np.take(found, range(a, b), axis=axis).max(axis=axis) for a, b in bounds]
             found = np.stack(parts, axis=axis)
         return CostGrid(found, resolution, self.origin, self.blocked, self.lethal)
-
-

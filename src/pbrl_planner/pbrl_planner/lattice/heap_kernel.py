@@ -1,4 +1,4 @@
-"""Compiled: a heap of whole numbers, four children a node: half the levels of a binary one, a node's in one line of cache.
+"""Compiled: a heap of whole numbers with four children a node: half the levels of one with two.
 
 An entry is one int64, the key in its upper bits and what it belongs to in the lower ones, so that a comparison is one
 instruction and equal keys come out in one order.

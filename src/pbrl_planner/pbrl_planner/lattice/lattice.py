@@ -22,7 +22,7 @@ from pbrl_planner.lattice.sweeps import Floor, Sweeps, cut_up
 SAME = 1e-6  # of a resolution, relative, by which two count as one
 MOST_STATES = 1 << 30
 DEAREST_MOVE = 1 << 18
-"""Cost of a primitive on floor of cost 0 at most: four minutes. The lower bound keeps a bucket for each cost of an edge."""
+"""Cost of a primitive on floor of cost 0 at most, four minutes: the lower bound keeps a bucket for each edge's cost."""
 BORDER = 255
 """Cost of the cells around the map."""
 State = tuple[int, int, int, int]
@@ -58,7 +58,7 @@ class Motions:
         if not shaped or self.costs.min(initial=1) < 1 or self.costs.max() > DEAREST_MOVE:
             raise PlannerError(
                 f"costs: expected {len(primitives.primitives)} whole numbers from 1 to {DEAREST_MOVE}, got "
-                f"{self.costs.dtype} {self.costs.shape}, at most {self.costs.max(initial=0)}; lower multipliers or raise speeds"
+                f"{self.costs.dtype} {self.costs.shape} up to {self.costs.max(initial=0)}; lower multipliers or raise speeds"
             )
         self.moves = moves_of(primitives, self.costs, body)
         self._cut: dict[str, list[NDArray[np.int32]]] = {}

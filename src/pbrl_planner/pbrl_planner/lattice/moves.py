@@ -102,7 +102,9 @@ class MoveTables:
             rank.append(len(into[move.target]))
             into[move.target].append(m)
         if max(rank) > 255:
-            raise PlannerError(f"primitives: expected at most 256 into one heading and articulation, got {max(rank) + 1}")
+            raise PlannerError(
+                f"primitives: expected at most 256 into one heading and articulation, got {max(rank) + 1}"
+            )
         cells = [sorted(y * stride + x for x, y in move.dear) for move in ordered]
         return cls(
             _ints(np.concatenate(([0], np.cumsum(counts)))),
@@ -135,7 +137,7 @@ class Relaxed:
     Attributes:
         floor: moves between cells, headings forgotten; most primitives are left out, being no cheaper than a way by
             others through cells that they cross themselves.
-        turning: (bins, bins) of changing from each bin to each other anywhere; as good as infinite where that cannot be.
+        turning: (bins, bins) of changing from each bin to each other anywhere; a large number where that cannot be.
     """
 
     floor: list[Move]
@@ -179,7 +181,7 @@ def _needed(moves: list[Move]) -> list[Move]:
 
 
 def _cost_of_others(move: Move, others: list[Move]) -> int:
-    """Return the least cost of a move's way by others through its own cells; one more than its own where that is less."""
+    """Return the least cost of a move's way by others through its own cells; one more than its own where it is less."""
     allowed = {*move.centre, (0, 0), (move.dx, move.dy)}
     queue, best = [(0, (0, 0))], {(0, 0): 0}
     while queue:

@@ -6,6 +6,7 @@ An articulated file has two lines more in its head (`numberofarticulations: 3`, 
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,7 @@ def parse_primitives(tokens: Tokens) -> PrimitiveSet:
         count = tokens.whole("numberofarticulations", 1, 64)
         tokens.key("articulations_rad")
         articulations = tuple(tokens.number("articulations_rad", -4.0, 4.0) for _ in range(count))
-        if any(a >= b for a, b in zip(articulations, articulations[1:], strict=False)):
+        if any(a >= b for a, b in pairwise(articulations)):
             raise tokens.refuse("ascending articulations", str(articulations))
     tokens.key("totalnumberofprimitives")
     total = tokens.whole("totalnumberofprimitives", 1, MOST)

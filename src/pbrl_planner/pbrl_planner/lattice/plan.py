@@ -32,8 +32,8 @@ class LatticePlan:
     """The best plan so far, or that there is none.
 
     Attributes:
-        poses: (n, 4) x, y, heading, articulation of the robot in `world` [m, m, rad, rad], heading without jumps; (0, 4)
-            where no plan was found.
+        poses: (n, 4) x, y, heading, articulation of the robot in `world` [m, m, rad, rad], heading without jumps;
+            (0, 4) where no plan was found.
         primitives: (k,) their numbers, in order.
         waypoints: (k + 1, 4) poses between them.
         cost: the sum of its edges' costs; -1 without a plan.

@@ -140,7 +140,8 @@ class _Search:
             )
             if status == kernel.TOO_COSTLY:
                 raise PlannerError(
-                    f"costs: expected sums below {self._numbers[kernel.MOST]}, got more; lower the multipliers or the map's costs"
+                    f"costs: expected sums below {self._numbers[kernel.MOST]}, got more; lower the multipliers or "
+                    "the map's costs"
                 )
             if status == kernel.FULL:
                 self._heap, self._waiting = _grown(self._heap), _grown(self._waiting)

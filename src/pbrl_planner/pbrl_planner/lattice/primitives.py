@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +76,7 @@ class PrimitiveSet:
             raise PlannerError(f"primitives: expected a resolution above zero, got {self.resolution}")
         if not 1 <= self.headings <= 256:
             raise PlannerError(f"primitives: expected 1 to 256 headings, got {self.headings}")
-        ascending = all(a < b for a, b in zip(self.articulations, self.articulations[1:], strict=False))
+        ascending = all(a < b for a, b in pairwise(self.articulations))
         if not (1 <= len(self.articulations) <= 64 and ascending and np.isfinite(self.articulations).all()):
             raise PlannerError(f"primitives: expected 1 to 64 ascending articulations, got {self.articulations}")
         if not self.primitives:
@@ -148,7 +149,9 @@ def closing_fault(primitive: Primitive, resolution: float, headings: int, articu
     places = np.array([[0.0, 0.0], [dx * resolution, dy * resolution]])
     off = np.hypot(*(poses[[0, -1], :2] - places).T)
     angles = [heading * TURN / headings, end_heading * TURN / headings]
-    turned = [abs(math.remainder(float(pose[2]) - angle, TURN)) for pose, angle in zip(poses[[0, -1]], angles, strict=True)]
+    turned = [
+        abs(math.remainder(float(pose[2]) - angle, TURN)) for pose, angle in zip(poses[[0, -1]], angles, strict=True)
+    ]
     bent = np.abs(poses[[0, -1], 3] - [articulations[phi], articulations[end_phi]])
     for k, which in enumerate(("first", "last")):
         if off[k] > CLOSING * resolution:

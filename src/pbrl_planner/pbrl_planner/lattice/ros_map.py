@@ -38,7 +38,8 @@ def read_map(
     Args:
         path: of the YAML file.
         unknown: what becomes of unknown cells.
-        near, nearest: see `CostGrid.of_occupied`; the larger of both costs counts.
+        near: distance from obstacles at which their cost ends [m]; see `CostGrid.of_occupied`.
+        nearest: cost right beside them; where the map says one as well, the larger counts.
 
     Raises:
         PlannerError: the files are not what they should be: file, key, what was expected and got.
@@ -106,9 +107,7 @@ def _yaml(path: Path) -> dict[str, Any]:
     return content
 
 
-def _number(
-    path: Path, said: dict[str, Any], key: str, low: float, high: float, default: float | None = None
-) -> float:
+def _number(path: Path, said: dict[str, Any], key: str, low: float, high: float, default: float | None = None) -> float:
     value = said.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low < value <= high:
         raise PlannerError(f"{path}: expected {key}: a number above {low:g}, at most {high:g}, got {str(value)[:60]!r}")
@@ -131,7 +130,7 @@ def _pixels(path: Path) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         image = None
     if image is None or image.shape[:2] != (height, width):
         raise PlannerError(f"{path}: expected a whole image of {width} x {height} pixels, got one that ends early")
-    scale = 255.0 / np.iinfo(image.dtype).max
+    scale = 255.0 / (65535 if image.dtype == np.uint16 else 255)
     pixels = image.astype(float).reshape(height, width, -1) * scale
     clear = pixels[..., -1] < 255.0 if pixels.shape[2] in (2, 4) else np.zeros((height, width), dtype=bool)
     return pixels[..., : 3 if pixels.shape[2] >= 3 else 1].mean(axis=2), clear

@@ -1,9 +1,9 @@
 """Compiled: one round of ARA* (Likhachev et al.; thesis 4.5.4) over a lattice in flat arrays, to be gone on with.
 
 States are numbered cell * bins + bin, on a grid with a border of blocked cells, so that a move is one addition and no
-move needs a test of the map's edge. A state's record is one number, LIMIT - g in its upper bits, hence 0 where it was never
-seen: large arrays then cost nothing until they are touched. Keys are `denominator * g + numerator * h`, whole numbers, so that the bound of
-epsilon = numerator / denominator holds to the last unit of cost.
+move needs a test of the map's edge. A state's record is one number, LIMIT - g in its upper bits, hence 0 where it was
+never seen: large arrays then cost nothing until they are touched. Keys are `denominator * g + numerator * h`, whole
+numbers, so that the bound of epsilon = numerator / denominator holds to the last unit of cost.
 """
 
 from __future__ import annotations
@@ -83,7 +83,12 @@ def improve(
         numbers: (10,) what is carried from call to call; places above.
         allowed: expansions of this call.
         stride: cells of a row of the grid with its border.
-        shape, pieces_first, pieces, levels, free, known: see `is_free`; an empty shape: a point moves.
+        shape: see `is_free`, as the rest; empty: a point moves.
+        pieces_first: (m + 1,).
+        pieces: (p, 3).
+        levels: of the floor.
+        free: answers.
+        known: which are there.
 
     Returns:
         DONE, EXHAUSTED, BUDGET, FULL or TOO_COSTLY.
@@ -218,4 +223,4 @@ def next_round(
     heapify(heap, count)
     numbers[HEAP], numbers[WAITING], numbers[NUMERATOR] = count, 0, numerator
     numbers[ROUND] = round_ + 1
-    return least
+    return int(least)

@@ -56,11 +56,12 @@ def is_free(
 
 
 @njit(cache=True)
-def taken_word(top: int, left: int, pieces: Int, levels: Word) -> int:
+def taken_word(top: int, left: int, pieces: Int, levels: Word) -> np.uint64:
     """Return the bits of where a sweep, begun at 64 places side by side, would meet something.
 
     Args:
-        top, left: row and first column of those places in the bits of the floor.
+        top: row of those places in the bits of the floor.
+        left: first column of them.
         pieces: (p, 3) row and first cell relative to them, level.
         levels: (levels, rows, words) bits of the floor.
     """

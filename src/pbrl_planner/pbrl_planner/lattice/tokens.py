@@ -1,4 +1,4 @@
-"""Words of a text file that somebody else wrote, one after the other, each with its line for what there is to object."""
+"""Words of a text file that somebody else wrote, one after the other, and the line that each is in."""
 
 from __future__ import annotations
 
