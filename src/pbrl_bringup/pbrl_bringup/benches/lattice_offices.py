@@ -97,7 +97,7 @@ def _furnish(
         x = left + WALL + int(rng.integers(max(1, width - 2 * WALL - long)))
         away = int(rng.integers(_cells(3.4) - deep))
         beside = x > door + clear // 2 or x + long < door - clear // 2
-        if not beside and away < clear + WALL:
+        if not beside and away < clear + 3 * WALL:
             continue
         y = door_row + WALL + away if row > 0 else door_row - WALL - away - deep
         occupied[max(y, 0) : max(y + deep, 0), x : x + long] = True
