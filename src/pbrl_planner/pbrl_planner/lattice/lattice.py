@@ -58,7 +58,7 @@ class Motions:
         if not shaped or self.costs.min(initial=1) < 1 or self.costs.max() > DEAREST_MOVE:
             raise PlannerError(
                 f"costs: expected {len(primitives.primitives)} whole numbers from 1 to {DEAREST_MOVE}, got "
-                f"{self.costs.dtype} {self.costs.shape} up to {self.costs.max(initial=0)}; lower multipliers or raise speeds"
+                f"{self.costs.dtype} {self.costs.shape} up to {self.costs.max(initial=0)}; lower multipliers"
             )
         self.moves = moves_of(primitives, self.costs, body)
         self._cut: dict[str, list[NDArray[np.int32]]] = {}
