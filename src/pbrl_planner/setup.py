@@ -5,7 +5,7 @@ NAME = "pbrl_planner"
 setup(
     name=NAME,
     version="0.1.0",
-    description="Planners of motions on learned physics: kinodynamic RRT of what a robot pushes.",
+    description="Planners: kinodynamic RRT of what a robot pushes on learned physics; lattice of a robot with a cart.",
     license="BSD-3-Clause",
     packages=find_packages(),
     package_data={NAME: ["py.typed"]},
@@ -13,6 +13,6 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["numba", "numpy", "ompl", "pydantic", "shapely"],
+    install_requires=["numba", "numpy", "ompl", "opencv-python-headless", "pydantic", "scipy", "shapely"],
     zip_safe=False,
 )

@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bullet_sim.boxes import combine
+from bullet_sim.carts import cart_boxes, cart_slabs
+from bullet_sim.catalogue import UtilityCart
 from bullet_sim.clamp import GripperSpec, find_clamp
 from bullet_sim.client import GRAVITY, Pose, yaw_quaternion
 
@@ -155,3 +158,14 @@ def test_a_held_bar_is_the_one_that_was_clamped(lab: Any) -> None:
     body = cart_world(lab, FRONT).find("cart")
     for x, expected in ((-0.434, 0), (0.0, 1), (0.434, 2)):
         assert body.slab_at(np.array([x, 0.1, -0.016])) is body.slabs[expected]
+
+
+def test_a_cart_without_an_upper_shelf_weighs_the_same_sits_lower_and_has_bars_alone_to_clamp() -> None:
+    carts = [UtilityCart.model_validate(CART | {"upper_shelf": there}) for there in (True, False)]
+    boxes = [cart_boxes(cart, 28.0) for cart in carts]
+    assert [sum(box.mass for box in each) for each in boxes] == pytest.approx([28.0, 28.0])
+    heights = [float(combine(each)[0][2]) for each in boxes]
+    assert heights[1] < heights[0] - 0.1
+    assert [len(cart_slabs(cart)) for cart in carts] == [3, 2]
+    middle = [any(np.all(np.abs([0, 0, 0.8955] - box.centre) <= box.half) for box in each) for each in boxes]
+    assert middle == [True, False]

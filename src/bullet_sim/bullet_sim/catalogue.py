@@ -163,6 +163,8 @@ class UtilityCart(OnCasters):
         bar_gap: between a bar and the upper shelf [m].
         lower_shelf: height of the lower shelf's top face [m].
         caster_inset: from the shelf's edges to the swivel axes [m].
+        upper_shelf: whether it has one; without it, what a laser sees over the cart is the room, and there is only the
+            bars to clamp.
     """
 
     kind: Literal["utility_cart"]
@@ -171,6 +173,7 @@ class UtilityCart(OnCasters):
     bar_gap: Positive = 0.060
     lower_shelf: Positive = 0.30
     caster_inset: Positive = 0.05
+    upper_shelf: bool = True
 
     @model_validator(mode="after")
     def _stands(self) -> Self:

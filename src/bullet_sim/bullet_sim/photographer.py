@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -22,7 +23,6 @@ from bullet_sim.camera_settings import CameraSettings
 from bullet_sim.cameras import Camera
 from bullet_sim.client import BulletClient, Pose
 from bullet_sim.quiet import bullet
-from bullet_sim.tag_plates import TagPlates
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -40,6 +40,13 @@ SAMPLED_AT = np.array([0.0, 1.0])
 """Where in a pixel, from its upper left corner, Bullet's software renderer looks: at the lower left one (measured)."""
 
 
+class Plates(Protocol):
+    """What is to be photographed."""
+
+    def outlines(self) -> list[tuple[Pose, Array]]:
+        """Give the pose of each plate, z out of it, and its corners (4, 3) [m] in `world`."""
+
+
 class Photographer:
     """All cameras of a room.
 
@@ -51,7 +58,7 @@ class Photographer:
         self,
         client: BulletClient,
         cameras: Sequence[Camera],
-        plates: TagPlates,
+        plates: Plates,
         settings: CameraSettings,
         rng: Generator,
     ) -> None:

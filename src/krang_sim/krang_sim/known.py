@@ -1,36 +1,7 @@
-"""What everybody may know of a scene: its geometry. The concealed part is not read here."""
+"""What everybody may know of a scene; see `bullet_sim.known`."""
 
 from __future__ import annotations
 
-import math
+from bullet_sim.known import known_scene
 
-import numpy as np
-
-from bullet_sim.catalogue import Body, Fixture, OnCasters
-from bullet_sim.scene import Scene
-from krang_sim.observations import KnownBody, KnownScene
-
-
-def known_scene(scene: Scene, time: float) -> KnownScene:
-    """Describe the geometry of a scene as it was at its start.
-
-    Args:
-        scene: read from its file.
-        time: stamp [s] for the description.
-    """
-    bodies = tuple(_known_body(name, body) for name, body in scene.bodies.items())
-    return KnownScene(time, bodies, np.array(scene.room.outline))
-
-
-def _known_body(name: str, body: Body) -> KnownBody:
-    swivels = list(body.swivels.values()) if isinstance(body, OnCasters) else []
-    built_in = isinstance(body, Fixture)
-    return KnownBody(
-        name=name,
-        footprint=body.footprint,
-        height=body.height,
-        nominal_mass=math.nan if isinstance(body, Fixture) else body.nominal_mass,
-        movable=not built_in,
-        pose=np.array(body.pose),
-        casters=np.array(swivels).reshape(-1, 2),
-    )
+__all__ = ["known_scene"]

@@ -21,12 +21,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from bullet_sim.errors import SimError
+from bullet_sim.ros.parameters import declare, refuse_unknown
 from bullet_sim.scene import load_scene
 from krang_sim.errors import KrangError
 from krang_sim.hand_session import HandSession, straight_push
 from krang_sim.messages import LATCHED, message_types, to_messages
 from krang_sim.observations import ClockTick, Observation
-from krang_sim.ros.parameters import declare, refuse_unknown
 
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=1000)

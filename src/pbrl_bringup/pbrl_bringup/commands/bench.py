@@ -22,6 +22,7 @@ BENCHES = {
     "tags": "tags found in rendered pictures of six cameras, and the model of their noise, against the truth",
     "control": "the body controller: Jacobians, limits, tick, jitter, steering; object paths and grasps in Bullet",
     "namo": "the planner among movable obstacles: time, unreachable goals, random rooms, against a kinodynamic RRT",
+    "lattice": "the lattice planner: cubicles beside SBPL's figures, a cart through narrow doors, what a turn sweeps",
     "next-experiment": "pushes until it is known what was left out, chosen by information or at random",
     "mismatch": "the watch over a stream: half an hour of clean pushing without an alarm, and how late alarms are",
 }

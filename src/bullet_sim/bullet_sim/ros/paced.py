@@ -1,0 +1,233 @@
+"""What every simulator's node is: a session stepped at a pace, published, and obedient to commands, grasp and release.
+
+Pace. `rate` is how many simulated seconds pass in a second of the wall clock: 1.0 is real time, 0 is as
+fast as the machine can. At any rate but 1.0 the simulator waits for controllers: as long as commands
+come in, it goes at most `command_lag` of simulated time beyond the last one before it waits for the next
+(`PATIENCE` on the wall clock; then the controller counts as gone until it speaks again). A
+controller that is slower than the simulator thus slows it down, and the run stays the same
+as at real time but for the machine's jitter.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import rclpy
+from pbrl_msgs.srv import GraspObject, ReleaseObject
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Float64MultiArray
+
+from bullet_sim.errors import SimError
+from bullet_sim.grippers import GraspOutcome
+from bullet_sim.messages import LATCHED, to_messages
+from bullet_sim.ros.parameters import declare
+
+PATIENCE = 0.1
+"""[s] on the wall clock that the simulator waits for a controller that has spoken before."""
+LISTEN_PERIOD = 0.0099
+"""[s] of simulated time between looks at the incoming queues: once a clock tick."""
+SLIP = 0.25
+"""[s] of wall clock behind schedule at which the lost time is written off instead of caught up."""
+
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STREAM_QOS = QoSProfile(depth=100)
+COMMAND_QOS = QoSProfile(depth=1)
+PICTURE_QOS = QoSProfile(depth=2)  # a megabyte each
+
+
+class Session(Protocol):
+    """A run of a robot in a scene."""
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the start."""
+
+    def step(self) -> Sequence[Any]:
+        """Advance by one physics step; give what is published now."""
+
+    def command_arm(self, side: str, velocity: Sequence[float]) -> None:
+        """Ask for the velocities (7,) [rad/s] of an arm's joints."""
+
+    def grasp(self, side: str, object_name: str = "") -> GraspOutcome:
+        """Close a gripper."""
+
+    def release(self, side: str) -> GraspOutcome:
+        """Open a gripper."""
+
+    def close(self) -> None:
+        """End it."""
+
+
+class PacedSimulator(Node):
+    """Steps a session, publishes what it gives, obeys the command topics.
+
+    Args:
+        name: of the node.
+        stop: when it is set, `run` returns at its next step.
+
+    A simulator declares its own parameters and `declare_pace`, and then calls `start` with its session.
+    """
+
+    def __init__(self, name: str, stop: threading.Event) -> None:
+        super().__init__(name)
+        self._stop = stop
+        self._heard = 0
+        self._last_command: float | None = None
+
+    def declare_pace(self) -> None:
+        """Declare the parameters of the pace.
+
+        Raises:
+            SimError: a wrong one.
+        """
+        rate = "simulated seconds per second; 0: as fast as possible"
+        self._rate: float = declare(self, "rate", 1.0, rate, (0.0, 1000.0))
+        self._duration: float = declare(self, "duration", 0.0, "simulated seconds to run; 0: for ever", (0.0, 1e6))
+        lag = "at a rate other than 1: simulated seconds to run on after a command before waiting for the next"
+        self._lag: float = declare(self, "command_lag", 0.02, lag, (0.0, 1.0))
+
+    def start(self, session: Session, types: dict[str, Callable[[], Any]], latched: Sequence[str] = LATCHED) -> None:
+        """Offer topics and services of a session.
+
+        Args:
+            session: the run.
+            types: message class by topic that it publishes.
+            latched: topics whose last message late subscribers get too.
+        """
+        self._session = session
+        self._outputs = {
+            topic: self.create_publisher(kind, topic, _quality(topic, latched)) for topic, kind in types.items()
+        }
+        for side in ("left", "right"):
+            self.listen(
+                Float64MultiArray,
+                f"/{side}_arm_velocity_controller/commands",
+                lambda message, side=side: session.command_arm(side, message.data),
+            )
+        self.create_service(GraspObject, "/grasp", self._grasp)
+        self.create_service(ReleaseObject, "/release", self._release)
+        self._spinner = SingleThreadedExecutor()
+        self._spinner.add_node(self)
+
+    def listen(self, kind: Any, topic: str, command: Callable[[Any], None]) -> None:
+        """Obey the messages of a topic; what `command` raises SimError for is warned about and ignored."""
+        self.create_subscription(kind, topic, lambda message: self._obey(command, message), COMMAND_QOS)
+
+    def _obey(self, command: Callable[[Any], None], message: Any) -> None:
+        self._heard += 1
+        try:
+            command(message)
+        except SimError as error:
+            self.get_logger().warning(f"ignored: {error}", throttle_duration_sec=1.0)
+        else:
+            self._last_command = self._session.time
+
+    def _grasp(self, request: GraspObject.Request, response: GraspObject.Response) -> GraspObject.Response:
+        self._heard += 1
+        outcome = self._session.grasp(request.gripper, request.object)
+        response.success, response.message, response.distance = outcome.success, outcome.message, outcome.distance
+        return response
+
+    def _release(self, request: ReleaseObject.Request, response: ReleaseObject.Response) -> ReleaseObject.Response:
+        self._heard += 1
+        outcome = self._session.release(request.gripper)
+        response.success, response.message = outcome.success, outcome.message
+        return response
+
+    def run(self) -> None:
+        """Step and publish until the duration is over or the context shuts down."""
+        origin, next_listen, session = time.monotonic(), 0.0, self._session
+        while self._wanted() and not (self._duration and session.time >= self._duration):
+            for observation in session.step():
+                for topic, message in to_messages(observation):
+                    self._outputs[topic].publish(message)
+            if session.time >= next_listen:
+                next_listen = session.time + LISTEN_PERIOD
+                origin = self._keep_pace(origin)
+
+    def _wanted(self) -> bool:
+        return not self._stop.is_set() and self.context.ok()
+
+    def _keep_pace(self, origin: float) -> float:
+        """Hear what has come, and wait until the wall clock and the controllers allow the next tick.
+
+        Args:
+            origin: wall clock [s] at which simulated time zero was, or would have been.
+
+        Returns:
+            The origin, moved where time was lost that shall not be caught up.
+        """
+        self._listen(0.0)
+        if self._rate != 1.0:
+            self._await_command()
+        if not self._rate:
+            return origin
+        due = origin + self._session.time / self._rate
+        while (early := due - time.monotonic()) > 0 and self._wanted():
+            self._spinner.spin_once(timeout_sec=early)
+        return origin if early > -SLIP else origin - early
+
+    def _listen(self, patience: float) -> None:
+        """Run callbacks until none is waiting; wait at most `patience` [s] for the first."""
+        heard = -1
+        while heard != self._heard and self._wanted():
+            heard = self._heard
+            self._spinner.spin_once(timeout_sec=patience)
+            patience = 0.0
+
+    def _await_command(self) -> None:
+        """Hold the simulated clock while a controller that has spoken has not answered yet."""
+        deadline = time.monotonic() + PATIENCE
+        while self._last_command is not None and self._session.time - self._last_command > self._lag:
+            left = deadline - time.monotonic()
+            if left <= 0 or not self._wanted():
+                self._last_command = None
+                return
+            self._listen(left)
+
+    def destroy_node(self) -> None:
+        """End Bullet with the node."""
+        self._session.close()
+        self._spinner.remove_node(self)
+        super().destroy_node()
+
+
+def _quality(topic: str, latched: Sequence[str]) -> QoSProfile:
+    """Give the quality of service of what is published on a topic."""
+    if topic in latched:
+        return LATCHED_QOS
+    return PICTURE_QOS if topic.startswith("/camera/") else STREAM_QOS
+
+
+def run_node(name: str, make: Callable[[threading.Event], PacedSimulator]) -> None:
+    """Run a simulator's node; errors at start are one line and exit code 2."""
+    node = None
+    fault = ""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    try:
+        # rclpy's own handlers would shut the context down between a step and its publication.
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        node = make(stop)
+        node.run()
+    except ExternalShutdownException:
+        pass
+    except (SimError, rclpy_implementation.RCLError) as error:  # RCLError: --ros-args that cannot be read
+        fault = " ".join(str(error).split())
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    if fault:
+        print(f"{name}: {fault}", file=sys.stderr)
+        sys.exit(2)

@@ -1,0 +1,262 @@
+"""Anytime Repairing A* (thesis 4.5.4): a plan soon, then better ones, each with how far from the best it can be."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_control.planar import Array
+from pbrl_planner.errors import PlannerError
+from pbrl_planner.lattice import search_kernel as kernel
+from pbrl_planner.lattice.lower_bound import LowerBound
+from pbrl_planner.lattice.plan import Improvement, LatticePlan
+from pbrl_planner.lattice.problem import LatticeProblem
+from pbrl_planner.lattice.settings import LatticeSettings
+
+AT_ONCE = 20_000
+"""Expansions between two looks at the clock."""
+LARGEST_HEAP = 1 << 28
+ROOM = 1 << 14
+"""Entries of the heap to begin with."""
+
+
+def plan(
+    problem: LatticeProblem,
+    settings: LatticeSettings | None = None,
+    improved: Callable[[LatticePlan], bool | None] | None = None,
+) -> LatticePlan:
+    """Find a way from start to goal, and make it cheaper until it is the cheapest or the time is up.
+
+    The same problem and settings give the same plan, to the bit, unless the time limit is hit.
+
+    Args:
+        problem: what is asked.
+        settings: epsilons and patience.
+        improved: is given each solution as soon as it is there, the first one too; returns True: it is good enough.
+
+    Raises:
+        PlannerError: costs are too large to be added up.
+    """
+    return _Search(problem, settings or LatticeSettings(), improved).run()
+
+
+class _Search:
+    """One query: the arrays of the search, and what is known so far."""
+
+    def __init__(
+        self,
+        problem: LatticeProblem,
+        settings: LatticeSettings,
+        improved: Callable[[LatticePlan], bool | None] | None,
+    ) -> None:
+        self._began = time.perf_counter()
+        self._problem, self._settings, self._improved = problem, settings, improved
+        lattice = self._lattice = problem.lattice
+        self._tables, self._sweeps = lattice.tables(settings.direction), lattice.sweeps(settings.direction)
+        ends = [lattice.number_of(state) for state in (problem.start_state, problem.goal_state)]
+        self._root, self._goal = ends if settings.direction == "forward" else ends[::-1]
+        self._history: list[Improvement] = []
+        self._best: tuple[int, NDArray[np.int64]] | None = None
+        self._epsilon, self._least = math.inf, 1
+        self._bins = lattice.primitives.bins
+        self._bound = LowerBound.of(lattice, self._goal, settings.direction)
+        self._to_bound = self._elapsed()
+        self._records = np.zeros(lattice.cells * self._bins, dtype=np.int64)
+        self._heap = np.empty(ROOM, dtype=np.int64)
+        self._waiting = np.empty(ROOM, dtype=np.int64)
+        self._numbers = np.zeros(10, dtype=np.int64)
+
+    def run(self) -> LatticePlan:
+        """Lower epsilon round by round."""
+        if self._root == self._goal:
+            self._best, self._epsilon = (0, np.zeros(0, dtype=np.int64)), 1.0
+            self._tell()
+            return self._result(False, "")
+        if self._bound.at(self._root) >= kernel.LIMIT:
+            return self._result(True, "there is no way for the robot's centre, or none to turn so, whatever it does")
+        numerators = self._settings.numerators
+        self._open(numerators[0])
+        place = 0
+        while True:
+            status = self._round()
+            if status == kernel.BUDGET:
+                return self._stopped()
+            if status == kernel.EXHAUSTED:
+                return self._result(True, "everything that can be reached from the start was searched: there is no way")
+            place = self._next(numerators, place)
+            if self._tell() or place >= len(numerators):
+                return self._result(False, "")
+
+    def _open(self, numerator: int) -> None:
+        shift = int(self._lattice.cells * self._bins).bit_length()
+        numbers = self._numbers
+        numbers[kernel.GOAL], numbers[kernel.NUMERATOR] = self._goal, numerator
+        numbers[kernel.DENOMINATOR] = self._settings.denominator
+        numbers[kernel.SHIFT], numbers[kernel.ROUND] = shift, 1
+        numbers[kernel.MOST] = min(kernel.LIMIT, (1 << (62 - shift)) // numerator)
+        self._records[self._root] = kernel.LIMIT << 16
+        numbers[kernel.TOUCHED] = 1
+        self._heap[0] = ((numerator * self._bound.at(self._root)) << shift) | self._root
+        numbers[kernel.HEAP] = 1
+
+    def _round(self) -> int:
+        """Expand states until this epsilon's plan is there, nothing is left, or patience is at an end."""
+        lattice, tables, sweeps = self._lattice, self._tables, self._sweeps
+        cost = lattice.cost.ravel()
+        while True:
+            left = self._settings.expansions - int(self._numbers[kernel.EXPANDED])
+            if left <= 0 or self._elapsed() >= self._settings.time_limit:
+                return kernel.BUDGET
+            status = kernel.improve(
+                tables.first,
+                tables.step,
+                tables.cell_step,
+                tables.base,
+                tables.cells_first,
+                tables.cells,
+                tables.rank,
+                tables.target,
+                cost,
+                lattice.grid.blocked,
+                self._bins,
+                self._bound.toward,
+                self._bound.turning,
+                self._records,
+                self._heap,
+                self._waiting,
+                self._numbers,
+                min(left, AT_ONCE),
+                lattice.stride,
+                sweeps.shape,
+                sweeps.pieces_first,
+                sweeps.pieces,
+                sweeps.levels,
+                sweeps.free,
+                sweeps.known,
+            )
+            if status == kernel.TOO_COSTLY:
+                raise PlannerError(
+                    f"costs: expected sums below {self._numbers[kernel.MOST]}, got more; lower the multipliers or "
+                    "the map's costs"
+                )
+            if status == kernel.FULL:
+                self._heap, self._waiting = _grown(self._heap), _grown(self._waiting)
+            elif status != kernel.BUDGET:
+                return status
+
+    def _next(self, numerators: list[int], place: int) -> int:
+        """Note the plan, prove its bound, and make ready for the next epsilon that is below it; return its place."""
+        moves, cost = self._way()
+        self._best = (cost, moves)
+        # What is ahead of the goal on its way may have got cheaper since the goal was reached from there.
+        self._records[self._goal] = ((kernel.LIMIT - cost) << 16) | (int(self._records[self._goal]) & 0xFFFF)
+        while True:
+            place += 1
+            entries = int(self._numbers[kernel.HEAP] + self._numbers[kernel.WAITING])
+            while len(self._heap) < entries + self._bins:
+                self._heap = _grown(self._heap)
+            numerator = numerators[min(place, len(numerators) - 1)]
+            least = kernel.next_round(
+                self._bins,
+                self._bound.toward,
+                self._bound.turning,
+                self._records,
+                self._heap,
+                self._waiting,
+                self._numbers,
+                numerator,
+            )
+            self._least = max(1, self._least, min(least, cost))
+            proved = max(1.0, cost / self._least)
+            self._epsilon = min(self._epsilon, proved, numerators[place - 1] / self._settings.denominator)
+            if place >= len(numerators) or self._epsilon <= self._settings.last_epsilon:
+                return len(numerators)
+            if numerator < self._epsilon * self._settings.denominator:
+                return place
+
+    def _way(self) -> tuple[NDArray[np.int64], int]:
+        """Return the primitives (k,) from start to goal and what they cost together."""
+        tables, state, found = self._tables, self._goal, []
+        while state != self._root:
+            m = tables.into[state % self._bins][int(self._records[state]) & 255]
+            found.append(int(tables.primitive[m]))
+            state -= int(tables.step[m])
+        primitives = np.array(found, dtype=np.int64)
+        if self._settings.direction == "forward":
+            primitives = primitives[::-1]
+        return primitives, self._lattice.cost_along(self._problem.start_state, primitives)
+
+    def _tell(self) -> bool:
+        """Note the solution, give it away, and return whether it is good enough."""
+        assert self._best is not None, "called after a plan was found"
+        self._history.append(
+            Improvement(self._epsilon, self._best[0], int(self._numbers[kernel.EXPANDED]), self._elapsed())
+        )
+        return self._improved is not None and self._improved(self._result(False, "")) is True
+
+    def _stopped(self) -> LatticePlan:
+        """Return what there is when patience is at an end: a plan that got better since the last round, too."""
+        settings = self._settings
+        if self._best is None:
+            spent = int(self._numbers[kernel.EXPANDED]) >= settings.expansions
+            effort = f"with {settings.expansions} expansions" if spent else f"in {settings.time_limit:g} s"
+            return self._result(False, f"no plan found {effort}; there may be one: allow more")
+        moves, cost = self._way()
+        if cost < self._best[0]:
+            self._best = (cost, moves)
+            self._epsilon = min(self._epsilon, cost / self._least)
+            self._tell()
+        return self._result(False, "")
+
+    def _result(self, exhausted: bool, reason: str) -> LatticePlan:
+        cost, moves = self._best or (-1, np.zeros(0, dtype=np.int64))
+        found = self._best is not None
+        waypoints, poses = self._poses(moves) if found else (np.zeros((0, 4)), np.zeros((0, 4)))
+        return LatticePlan(
+            poses,
+            moves,
+            waypoints,
+            cost,
+            self._epsilon,
+            int(self._numbers[kernel.EXPANDED]),
+            int(self._numbers[kernel.TOUCHED]),
+            self._elapsed(),
+            self._history[0].seconds if self._history else math.inf,
+            self._to_bound,
+            tuple(self._history),
+            exhausted,
+            reason,
+        )
+
+    def _poses(self, moves: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Return the poses between primitives (k + 1, 4) and along them (n, 4), headings without jumps."""
+        lattice, here = self._lattice, self._problem.start_state
+        waypoints, parts = [lattice.pose_of(here)], [lattice.pose_of(here)[None]]
+        for number in moves:
+            each = lattice.primitives.primitives[number]
+            centre = np.append(waypoints[-1][:2], [0.0, 0.0])
+            here = (here[0] + each.end[0], here[1] + each.end[1], each.end[2], each.end[3])
+            waypoints.append(lattice.pose_of(here))
+            # Files round: the ends are exact.
+            parts += [(each.poses + centre)[1:-1], waypoints[-1][None]]
+        way, between = np.concatenate(parts), np.array(waypoints)
+        way[:, 2], between[:, 2] = np.unwrap(way[:, 2]), np.unwrap(between[:, 2])
+        return between, way
+
+    def _elapsed(self) -> float:
+        return time.perf_counter() - self._began
+
+
+def _grown(array: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return an array twice as long that begins with this one.
+
+    Raises:
+        PlannerError: it would be beyond all measure.
+    """
+    if 2 * len(array) > LARGEST_HEAP:
+        raise PlannerError(f"search: expected at most {LARGEST_HEAP} open states, got more; take larger cells")
+    return np.concatenate((array, np.empty_like(array)))
