@@ -364,7 +364,7 @@ def test_hostile_input_is_refused_in_words() -> None:
         CartController(CartPlan.timed(straight(1.0), SETTINGS.limits), pr2_body(), SETTINGS, np.zeros(3))
     for changes, words in (
         ({"stop_within": 0.06}, "stop_within"),
-        ({"near": 0.0}, "near"),
+        ({"near": 0.0, "margin": 0.1}, "near"),
         ({"limits": {"braking": 0.1}}, "braking"),
         ({"frequency": math.nan}, "finite|less"),
     ):
