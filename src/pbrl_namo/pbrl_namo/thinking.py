@@ -145,9 +145,9 @@ class Thoughts:
             found = fit_recording(recording, options).objects[job.object]
             posterior = found.posterior.thinned(KEPT_DRAWS, np.random.default_rng(job.seed)).canonical()
             belief = belief_of_draws(_movable(recording, job.object), posterior.names, posterior.flat)
-            met = find_encounter(recording, job.object)
-        except (BagError, ModelError, MismatchError, NamoError) as error:
+        except (BagError, ModelError, NamoError) as error:
             return Refused(_line(error))
+        met = _met(recording, job.object)
         unexplained = [note for note in found.notes if note.startswith(UNEXPLAINED)]
         unexplained += [] if met is None else [f"it {met.told()}"]
         belief = replace(belief, stops=_stops(job))
@@ -158,7 +158,7 @@ class Thoughts:
         begun = time.perf_counter()
         try:
             recording = self._recorded(job.begin, job.end)
-            met = find_encounter(recording, job.object)
+            met = _met(recording, job.object)
             if met is not None:
                 belief = self._before(recording, job, met.time)
                 return MismatchAnswer(_stopped(belief, job, met), f"it {met.told()}", time.perf_counter() - begun)
@@ -187,6 +187,14 @@ class Thoughts:
             return belief_of_draws(movable, drawn.names, drawn.flat)
         except (BagError, ModelError, NamoError):  # it moved too little until then
             return unlearned(movable, self._settings)
+
+
+def _met(recording: Recording, name: str) -> Encounter | None:
+    """Return what an object met on its way; None as well where that cannot be asked, because it hardly moved."""
+    try:
+        return find_encounter(recording, name)
+    except (BagError, ModelError, MismatchError):
+        return None
 
 
 def _stops(job: LearnJob) -> tuple[Stop, ...]:
