@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbrl_bag.types import Recording
 from pbrl_mismatch.data.residual import residual_wrench
-from pbrl_mismatch.data.track import Track
+from pbrl_mismatch.data.track import Track, origin_of
 from pbrl_mismatch.diagnose import track_of
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 
@@ -98,7 +98,7 @@ def find_encounter(recording: Recording, name: str) -> Encounter | None:
     deviation = float(np.sqrt(np.trace(found.covariance[begin + peak, :2, :2]) / 2.0))
     if forces[peak] < max(LEAST, RATIO * before, SURE * deviation):
         return None
-    origins = _origins(track, begin, begin + peak)
+    origins = [origin_of(state, track.body[1:3]) for state in track.seen[begin : begin + peak + 1]]
     if _went(track.outline, origins[0], origins[onset]) < FREELY:
         return None
     pose, wrench = origins[-1], found.world[begin + peak]
@@ -111,14 +111,6 @@ def find_encounter(recording: Recording, name: str) -> Encounter | None:
         float(forces[peak]),
         before,
     )
-
-
-def _origins(track: Track, first: int, last: int) -> Array:
-    """Return the poses (n, 3) of the body's frame [m, rad]."""
-    seen = track.seen[first : last + 1]
-    c, s = np.cos(seen[:, 2]), np.sin(seen[:, 2])
-    x, y = track.body[1], track.body[2]
-    return np.column_stack((seen[:, 0] - c * x + s * y, seen[:, 1] - s * x - c * y, seen[:, 2]))
 
 
 def _went(outline: Array, a: Array, b: Array) -> float:

@@ -14,13 +14,15 @@ import numpy as np
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.experiments.namo_figure import draw
 from pbrl_bringup.experiments.namo_kept import kept_run
-from pbrl_bringup.experiments.namo_rooms import Layout, draw_room
+from pbrl_bringup.experiments.namo_rooms import LONG, SQUARE, Layout, draw_room
 from pbrl_bringup.namo_run import NamoOutcome, run_namo
 from pbrl_bringup.parallel import in_parallel
 
 RUNS, ENOUGH = 40, 38
 RUNS_KEPT = "runs"
 """Folder below an experiment's own: what was stopped goes on with what is in it."""
+MOVED = 0.1
+"""[m] and [rad] together by which a table is elsewhere at the end of a run."""
 PLANNING = 2.0
 """Sum over a run [s]."""
 PLANS, UPDATES, SURPRISES, PLANNED = (
@@ -132,7 +134,20 @@ def rows_of(runs: Sequence[NamoOutcome], thesis: Told) -> list[Row]:
             "m",
             0.1,
         ),
+        at_least(
+            "of these, runs that left the stuck table and moved the other one",
+            sum(_as_told(run) for run in reached),
+            f"of {count}",
+            ENOUGH * count / RUNS,
+        ),
     ]
+
+
+def _as_told(run: NamoOutcome) -> bool:
+    """Say whether a run went as in the thesis: something was learned, the square table stayed, the long one did not."""
+    begun, ended = (np.array([run.moments[k].poses[name] for name in (SQUARE, LONG)]) for k in (0, -1))
+    moved = np.hypot(*(ended - begun)[:, :2].T) + np.abs(ended - begun)[:, 2] > MOVED
+    return run.rows[UPDATES] > 0.0 and not moved[0] and bool(moved[1])
 
 
 def told(run: NamoOutcome) -> dict[str, Any]:
