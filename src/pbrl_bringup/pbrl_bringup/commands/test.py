@@ -12,6 +12,8 @@ from pbrl_bringup.paths import workspace
 from pbrl_bringup.terminal import say
 
 CHECKED = ("src", "test")
+MOST = 4
+"""Files of tests that are run at once."""
 
 
 def command(arguments: Sequence[str]) -> int:
@@ -32,7 +34,16 @@ def command(arguments: Sequence[str]) -> int:
         if code:
             return code
         say(f"pbrl: {what} ok")
-    return run_step([sys.executable, "-m", "pytest", *(arguments or ["test"])], root)
+    return run_step([sys.executable, "-m", "pytest", *(arguments or [*at_once(), "test"])], root)
+
+
+def at_once() -> list[str]:
+    """Return the options of pytest by which files of tests are run beside each other, on as many cores as there are.
+
+    Not on more than `MOST`: graphs of nodes run in real time, and want a core.
+    """
+    workers = min(len(os.sched_getaffinity(0)), MOST)
+    return ["-n", str(workers), "--dist", "loadfile"] if workers > 1 else []
 
 
 def run_step(step: Sequence[str], root: Path) -> int:
