@@ -1,0 +1,335 @@
+"""The PR2 pushes a cart through an office to a goal, without middleware: simulator, planner and controller in one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pbrl_bringup.cart.navigator import PATIENCE, Answer, Navigator, PlannerCall
+from pbrl_bringup.cart.outline import GRIP, frame_at_grip, motions
+from pbrl_bringup.cart.senses import CartSenses
+from pbrl_control.cart import CartBody, CartCommand, CartController, CartLimits, CartPlan, CartSettings, DriveStatus
+from pbrl_control.planar import Array, compose, wrap
+from pbrl_planner.lattice import LatticePlan, LatticeSettings, Motions
+from pr2_cart_sim.scene import OfficeScene
+from pr2_cart_sim.sensing import in_base
+from pr2_cart_sim.session import Pr2Session
+
+TICK = 0.05
+"""Of the local controller [s]; thesis: 20 Hz."""
+SIDES = ("left", "right")
+LONGEST = 300.0
+"""Simulated time after which a leg is given up [s]."""
+BLOCKED = 2.0
+"""Time before something that is in the way after which a way round it is looked for [s]."""
+RETRY = 2.0
+"""Time between two calls of the planner of which the first found nothing [s]."""
+REFRESH = 15.0
+"""Time on one plan after which it is made again: the floor is better known by then [s]."""
+TRACED = 0.5
+"""Between two points of the trace [s]."""
+SETTINGS = CartSettings(limits=CartLimits(articulation=(-0.45, 0.45)), delay=0.03, margin=0.015)
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Where everything truly was: for pictures and scores.
+
+    Attributes:
+        time: [s].
+        base: (3,) [m, rad].
+        cart: (3,) of the cart's own frame [m, rad].
+        status: of the local controller; "planning" without one.
+        cause: why it was not at full speed.
+        people: (x, y) by name [m].
+    """
+
+    time: float
+    base: tuple[float, ...]
+    cart: tuple[float, ...]
+    status: str
+    cause: str
+    people: Mapping[str, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A contact: who of us touched whom, when [s] and with how much [N]."""
+
+    mover: str
+    other: str
+    person: bool
+    time: float
+    force: float
+
+
+@dataclass(frozen=True)
+class Score:
+    """What came of the drive, by the simulator's truth.
+
+    Attributes:
+        contacts: with people, furniture, walls.
+        nearest_person: least distance of robot or cart to somebody [m].
+        nearest_thing: to anything else [m].
+        position_errors: of the base from the plan's goal of the moment, as the robot has it, a tick [m].
+        angle_errors: the greater one of heading and articulation, likewise [rad].
+        goal_error: of the base to the goal, truly [m].
+        goal_angle: likewise [rad].
+        way: of the base, truly [m].
+    """
+
+    contacts: tuple[Touch, ...]
+    nearest_person: float
+    nearest_thing: float
+    position_errors: tuple[float, ...]
+    angle_errors: tuple[float, ...]
+    goal_error: float
+    goal_angle: float
+    way: float
+
+
+@dataclass(frozen=True)
+class CartOutcome:
+    """What became of one leg.
+
+    Attributes:
+        reached: whether the robot says that it is there.
+        sentence: how it ended.
+        seconds: simulated [s].
+        calls: of the planner.
+        trace: the story.
+        score: by the truth.
+        goal: (3,) asked for.
+        room: corners of the floor [m].
+        plan: (n, 4) the last one [m, rad].
+    """
+
+    reached: bool
+    sentence: str
+    seconds: float
+    calls: tuple[PlannerCall, ...]
+    trace: tuple[Trace, ...]
+    score: Score
+    goal: tuple[float, ...]
+    room: tuple[tuple[float, ...], ...]
+    plan: tuple[tuple[float, ...], ...]
+
+
+@dataclass
+class _Going:
+    """A plan that is driven: its controller, when it began, since when it stands before something."""
+
+    plan: LatticePlan
+    controller: CartController
+    since: float
+    blocked: float | None = None
+
+
+@dataclass
+class _Errors:
+    """Of each tick on a plan."""
+
+    position: list[float] = field(default_factory=list)
+    angle: list[float] = field(default_factory=list)
+
+
+class CartRun:
+    """One session and what drives in it; what is thought takes no simulated time.
+
+    Args:
+        session: of the simulator, the cart in both hands.
+        goal: (3,) of `base` in `map` [m, rad].
+        swept: motions of robot and cart.
+        planning: epsilons and patience of the planner.
+        settings: of the local controller.
+
+    Attributes:
+        senses: all that is perceived.
+        navigator: plans, and has an account of it.
+        trace: the story so far.
+    """
+
+    def __init__(
+        self,
+        session: Pr2Session,
+        goal: Array,
+        swept: Motions,
+        planning: LatticeSettings = PATIENCE,
+        settings: CartSettings = SETTINGS,
+    ) -> None:
+        self.session, self.goal = session, np.asarray(goal, dtype=float)
+        self.senses = CartSenses(swept.primitives.resolution)
+        self.navigator = Navigator(swept, planning)
+        self.trace: list[Trace] = []
+        self.ended = ""
+        self.reached = False
+        self.errors = _Errors()
+        self.last_plan: LatticePlan | None = None
+        self._settings = settings
+        self._going: _Going | None = None
+        self._sent = np.zeros(4)
+        self._next_tick, self._next_plan, self._next_trace = 0.0, 0.0, 0.0
+
+    def step(self) -> None:
+        """Advance the simulator by one step; perceive, and control at each tick."""
+        for observation in self.session.step():
+            self.senses.hear(observation)
+        now = self.session.time
+        if now + 1e-9 >= self._next_tick:
+            self._next_tick += TICK
+            self._tick(now)
+
+    def _tick(self, now: float) -> None:
+        command: CartCommand | None = None
+        if self._going is None and now >= self._next_plan:
+            self._set_out(now)
+        percept = self.senses.percept(now)
+        if self._going is not None and percept is not None:
+            command = self._going.controller.step(now, percept)
+            self._send(command)
+            self._note_errors(command)
+            self._heed(now, command)
+        else:
+            self.session.command_base(0.0, 0.0, 0.0)
+            self._sent = np.zeros(4)
+        if now + 1e-9 >= self._next_trace:
+            self._next_trace += TRACED
+            self.trace.append(self._traced(now, command))
+
+    def _send(self, command: CartCommand) -> None:
+        self.session.command_base(*map(float, command.twist))
+        if command.joint_rates is not None:
+            for side, rates in zip(SIDES, command.joint_rates, strict=True):
+                self.session.command_arm(side, rates.tolist())
+        self._sent = np.append(command.twist, command.articulation_rate)
+
+    def _heed(self, now: float, command: CartCommand) -> None:
+        """Do what the controller's status asks for."""
+        going = self._going
+        assert going is not None, "called while a plan is driven"
+        if command.status is DriveStatus.ARRIVED:
+            self.reached, self.ended = True, "at the goal"
+        elif command.status is DriveStatus.FAILED:
+            self.ended = command.reason
+        elif command.status is DriveStatus.REPLAN:
+            self._going = None
+            self.senses.recover(now)
+        elif command.status is DriveStatus.BLOCKED:
+            going.blocked = now if going.blocked is None else going.blocked
+            if now - going.blocked >= BLOCKED and now >= self._next_plan:
+                self._set_out(now)
+        else:
+            going.blocked = None
+            if now - going.since >= REFRESH and now >= self._next_plan:
+                self._set_out(now)
+
+    def _set_out(self, now: float) -> None:
+        """Plan from here, and drive that; without a plan go on with the old one, if any, and try again later."""
+        here, floor, body = self.senses.state(now), self.senses.floor(now), self.senses.body
+        if here is None or floor is None or body is None:
+            return
+        self._next_plan = now + RETRY
+        made = self.navigator.plan(now, floor, here, self.goal)
+        if made is None and self.navigator.calls[-1].answer is Answer.SHUT_IN:
+            self.senses.recover(now)
+        if made is None:
+            return
+        self.last_plan = made
+        self._going = _Going(made, self._controller(made, here, body), now)
+
+    def _controller(self, made: LatticePlan, here: Array, body: CartBody) -> CartController:
+        """Return a controller that goes from here to the plan's start, then along it."""
+        poses = made.poses.copy()
+        poses[:, 2] += here[2] + wrap(float(poses[0, 2] - here[2])) - poses[0, 2]
+        low, high = self._settings.limits.articulation
+        first = np.array([*here[:3], min(max(float(here[3]), low), high)])
+        plan = CartPlan.timed(np.vstack([first, poses]), self._settings.limits, self._settings.share)
+        return CartController(plan, body, self._settings, self._sent)
+
+    def _note_errors(self, command: CartCommand) -> None:
+        if command.status is DriveStatus.MOVING and np.isfinite(command.error).all():
+            self.errors.position.append(math.hypot(*command.error[:2]))
+            self.errors.angle.append(float(np.abs(command.error[2:]).max()))
+
+    def _traced(self, now: float, command: CartCommand | None) -> Trace:
+        office = self.session.office
+        assert office.cart is not None, "the scene has a cart"
+        body, base = office.world.pose(office.cart), self.session.robot.base_pose()
+        pose = self.session.robot_truth()[0]
+        places = {name: (float(each.place[0]), float(each.place[1])) for name, each in self.session.people.items()}
+        return Trace(
+            now,
+            tuple(map(float, pose)),
+            tuple(map(float, compose(pose, in_base(base, body)))),
+            "planning" if command is None else str(command.status),
+            "" if command is None else str(command.cause),
+            places,
+        )
+
+
+def run_cart(
+    scene: OfficeScene,
+    goal: Array,
+    seed: int,
+    longest: float = LONGEST,
+    coarse: bool = False,
+    planning: LatticeSettings = PATIENCE,
+) -> CartOutcome:
+    """Drive to a goal in an office.
+
+    Args:
+        scene: with people and clutter, which reach the simulator only; the robot holds a cart.
+        goal: (3,) of `base` in `map` [m, rad].
+        seed: of world, people and sensors.
+        longest: simulated time after which it is given up [s].
+        coarse: plan on larger cells with half the headings: for tests.
+        planning: epsilons and patience of the planner.
+    """
+    assert scene.robot.holds is not None, "the robot holds a cart"
+    size = np.array(scene.bodies[scene.robot.holds].footprint)
+    length, width = np.ptp(size, axis=0)
+    with Pr2Session(scene, seed=seed) as session:
+        run = CartRun(session, goal, motions(float(length), float(width), coarse), planning)
+        while session.time < longest and not run.ended:
+            run.step()
+        return outcome(run)
+
+
+def outcome(run: CartRun) -> CartOutcome:
+    """Return what became of a run, scored by the truth."""
+    session = run.session
+    pose = session.robot_truth()[0]
+    places = np.array([each.base[:2] for each in run.trace]).reshape(-1, 2)
+    score = Score(
+        tuple(Touch(each.mover, each.other, each.person, each.start, each.peak) for each in session.contacts),
+        session.clearance.person,
+        session.clearance.thing,
+        tuple(run.errors.position),
+        tuple(run.errors.angle),
+        float(np.hypot(*(pose[:2] - run.goal[:2]))),
+        abs(wrap(float(pose[2] - run.goal[2]))),
+        float(np.hypot(*np.diff(places, axis=0).T).sum()),
+    )
+    last = run.navigator.calls[-1] if run.navigator.calls else None
+    sentence = run.ended or f"not at the goal after {session.time:.0f} s; the last call of the planner: " + (
+        "none" if last is None else f"{last.answer} {last.reason}"
+    )
+    room = run.senses.room if run.senses.room is not None else np.zeros((0, 2))
+    poses = run.last_plan.poses if run.last_plan is not None else np.zeros((0, 4))
+    return CartOutcome(
+        run.reached,
+        sentence,
+        session.time,
+        tuple(run.navigator.calls),
+        tuple(run.trace),
+        score,
+        tuple(map(float, run.goal)),
+        tuple(tuple(map(float, corner)) for corner in room),
+        tuple(tuple(map(float, pose)) for pose in poses),
+    )
+
+
+__all__ = ["GRIP", "CartOutcome", "CartRun", "Score", "Touch", "Trace", "frame_at_grip", "outcome", "run_cart"]
