@@ -53,7 +53,7 @@ def test_beams_touch_the_cells_that_a_slow_reference_finds(rng: np.random.Genera
                 for j in range(size):
                     if (i, j) != last and cells[i][j].intersects(line) and cells[i][j].intersection(line).length > 1e-9:
                         expected[i, j] = PASSED
-            if far <= 1.5 and 0 <= min(last) and max(last) < size:
+            if far <= 1.5 and min(last) >= 0 and max(last) < size:
                 hits.append(last)
         for hit in hits:
             expected[hit] = HIT
@@ -131,7 +131,7 @@ def test_moving_everything_by_whole_cells_changes_nothing(cells: tuple[int, int]
         scan = scan_of(rng.uniform(0.2, 4.0, 100), time=0.05 * k, increment=0.06)
         pose = np.array([*rng.uniform(-0.5, 0.5, 2), rng.uniform(-3, 3)])
         here.observe(scan, pose, [SQUARE])
-        there.observe(scan, pose + [*move, 0.0], [SQUARE + move])
+        there.observe(scan, pose + np.array([*move, 0.0]), [SQUARE + move])
     assert np.array_equal(here.field(0.2).cells, there.field(0.2).cells)
 
 
@@ -166,7 +166,7 @@ def test_rolling_keeps_each_cell_in_its_place() -> None:
 def test_a_cell_inside_the_footprint_is_cleared_by_recovery_which_says_so() -> None:
     costmap = Costmap(settings_of())
     costmap.observe(scan_of([1.02, 1.02, 1.02]), (0.0, 0.01, 0.0))
-    outline = SQUARE + [1.0, 0.0]
+    outline = SQUARE + np.array([1.0, 0.0])
     recovery = costmap.clear_inside([outline])
     assert len(recovery.places) == 3 and recovery.left == 0
     assert [Polygon(outline).distance(Point(place)) < 0.05 for place in recovery.places] == [True] * 3
@@ -216,7 +216,7 @@ def test_no_wall_gets_lost_whatever_the_maps_resolution_and_turn(
     found = static.onto((400, 400), 0.05, (-10.0, -10.0), pose)
     world = compose(pose, origin)
     for row, column in places:
-        corners = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) + [column, row]) * resolution
+        corners = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) + np.array([column, row])) * resolution
         outline = Polygon(corners @ rotation(world[2]).T + world[:2])
         i, j = (np.round((np.array(outline.centroid.coords[0])[::-1] + 10.0) / 0.05)).astype(int)
         reach = math.ceil(resolution / 0.05) + 1

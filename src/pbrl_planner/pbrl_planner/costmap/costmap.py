@@ -239,7 +239,7 @@ class Costmap:
     def _take_out(self, where: NDArray[np.bool_], what: str) -> Recovery:
         gone = where & (self._evidence > 0)
         rows, columns = np.nonzero(gone)
-        places = (np.column_stack((columns, rows)) + 0.5) * self.settings.resolution + self.origin
+        places: Array = (np.column_stack((columns, rows)) + 0.5) * self.settings.resolution + np.array(self.origin)
         spoke = self._evidence[gone].astype(np.int64)
         self._evidence[gone] = 0
         known = self._from_map()
@@ -248,9 +248,7 @@ class Costmap:
 
     def _from_map(self) -> NDArray[np.int8] | None:
         if self._static is not None and self._known is None:
-            self._known = self._static.onto(
-                self.settings.shape, self.settings.resolution, self.origin, self._map_pose
-            )
+            self._known = self._static.onto(self.settings.shape, self.settings.resolution, self.origin, self._map_pose)
         return self._known
 
     def _corner_for(self, centre: Sequence[float] | Array) -> tuple[int, int]:

@@ -21,8 +21,10 @@ def pass_through(ax: float, ay: float, bx: float, by: float, touched: Byte) -> N
     Amanatides and Woo (1987), with the steps along each axis counted, so that rounding leads nowhere else.
 
     Args:
-        ax, ay: where it begins, in cells from the window's corner.
-        bx, by: where it ends.
+        ax: where it begins along x, in cells from the window's corner.
+        ay: the same along y.
+        bx: where it ends along x.
+        by: the same along y.
         touched: (rows, columns), in and out.
     """
     rows, columns = touched.shape
@@ -70,10 +72,10 @@ def near_ring(x: float, y: float, ring: Array, margin: float) -> bool:
 @njit(cache=True)
 def near_any(x: float, y: float, corners: Array, first: Int, margin: float) -> bool:
     """Say whether a point is in one of several polygons, or near it: corners (c, 2), ring k from `first[k]` on."""
+    found = False
     for k in range(len(first) - 1):
-        if near_ring(x, y, corners[first[k] : first[k + 1]], margin):
-            return True
-    return False
+        found = found or near_ring(x, y, corners[first[k] : first[k + 1]], margin)
+    return found
 
 
 @njit(cache=True)
@@ -98,14 +100,19 @@ def trace(
 
     Args:
         ranges: (n,) [m].
-        angle_min, increment: of the beams [rad].
-        least, greatest: range that means something [m].
+        angle_min: of the first beam [rad].
+        increment: between beams [rad].
+        least: range that means something [m].
+        greatest: the same [m].
         pose: (3,) of the laser.
-        mark_range, clear_range: up to which obstacles, and free floor, are believed [m].
-        corners, first: outlines of robot and cart, see `near_any`.
+        mark_range: up to which obstacles are believed [m].
+        clear_range: up to which free floor is [m].
+        corners: of the outlines of robot and cart, see `near_any`.
+        first: where each begins.
         margin: about them [m].
         resolution: of a cell [m].
-        left, bottom: the window's corner [m].
+        left: lowest x of the window [m].
+        bottom: lowest y of it [m].
         touched: (rows, columns) zeros, out: `HIT` wins over `PASSED`.
     """
     rows, columns = touched.shape
@@ -141,7 +148,9 @@ def believe(
     Args:
         touched: (rows, columns) by `trace`; zeros afterwards.
         time: of the scan [s].
-        hit, miss, most: see `EvidenceSettings`.
+        hit: see `EvidenceSettings`.
+        miss: the same.
+        most: the same.
         evidence: (rows, columns), in and out.
         looked: (rows, columns) whether a cell was ever seen, in and out.
         last: (rows, columns) when something was last seen in it [s], in and out.
@@ -180,14 +189,18 @@ def forget(
 
 
 @njit(cache=True)
-def cells_near(corners: Array, first: Int, margin: float, resolution: float, left: float, bottom: float, found: Byte) -> None:
+def cells_near(
+    corners: Array, first: Int, margin: float, resolution: float, left: float, bottom: float, found: Byte
+) -> None:
     """Mark the cells whose centre is in one of several outlines, or at most a margin away.
 
     Args:
-        corners, first: see `near_any`.
+        corners: see `near_any`.
+        first: see there.
         margin: [m].
         resolution: of a cell [m].
-        left, bottom: the window's corner [m].
+        left: lowest x of the window [m].
+        bottom: lowest y of it [m].
         found: (rows, columns), out: 1.
     """
     rows, columns = found.shape

@@ -32,8 +32,11 @@ def sample_map(
         cell: its resolution [m].
         occupied_from: value from which a cell of it is occupied.
         resolution: of the grid [m].
-        left, bottom: corner of the grid, in its frame [m].
-        x, y, yaw: of the grid's frame, in the axes of the map's corner.
+        left: lowest x of the grid, in its frame [m].
+        bottom: lowest y of it [m].
+        x: of the grid's frame, in the axes of the map's corner [m].
+        y: the same [m].
+        yaw: the same [rad].
         samples: along each side of a cell of the grid.
         found: (rows, columns) of the grid, out: 1 occupied, 0 free, -1 unknown.
     """

@@ -1,0 +1,357 @@
+"""The local controller: it tracks, keeps limits, slows, stops, and says why."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from cart_cases import PATHS, SETTINGS, Costs, Tick, arc, drive, made, open_floor, pr2_body, straight
+from shapely import Polygon
+
+from pbrl_control.cart import (
+    ArmState,
+    CartController,
+    CartLimits,
+    CartPlan,
+    CartSettings,
+    Cause,
+    DriveStatus,
+    compile_kernels,
+)
+from pbrl_control.cart.tracking import feedback
+from pbrl_control.errors import ControlError
+
+FLOOR = open_floor()
+
+
+def assert_within_limits(ticks: list[Tick], limits: CartLimits, dt: float = 0.05) -> None:
+    sent = np.array([np.zeros(4), *(tick.sent for tick in ticks)])
+    speeds = np.column_stack((np.hypot(sent[:, 0], sent[:, 1]), np.abs(sent[:, 2:])))
+    assert (speeds <= limits.speeds + 1e-9).all()
+    steps = np.diff(sent, axis=0)
+    changes = np.column_stack((np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2:])))
+    assert (changes <= limits.brakings * dt + 1e-9).all()
+    faster = np.diff(speeds, axis=0)
+    assert (faster <= limits.accelerations * dt + 1e-9).all()
+
+
+def outline_at(state: np.ndarray) -> shapely.Geometry:
+    return shapely.union_all([Polygon(ring) for ring in pr2_body().outlines(state[:3], float(state[3]))])
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_it_tracks_within_3_cm_and_2_degrees_despite_noise_and_delay(name: str) -> None:
+    controller, world = made(PATHS[name])
+    ticks = drive(controller, world, FLOOR, 40.0)
+    assert ticks[-1].command.status is DriveStatus.ARRIVED
+    # A command moves the robot a tick later, and what it aims at is meant for then.
+    off = np.array([after.state - tick.command.goal for tick, after in pairwise(ticks)])
+    assert np.hypot(off[:, 0], off[:, 1]).max() < 0.03
+    assert np.abs(off[:, 2:]).max() < math.radians(2.0)
+    assert_within_limits(ticks, SETTINGS.limits)
+    end = ticks[-1].state - PATHS[name][-1]
+    assert np.hypot(*end[:2]) < SETTINGS.tolerance and np.abs(end[2:]).max() < SETTINGS.angle_tolerance
+
+
+@pytest.mark.parametrize("name", ["arc", "articulated"])
+def test_wheels_that_slip_and_arms_that_give_way_do_not_lead_it_off(name: str) -> None:
+    controller, world = made(PATHS[name], slip=np.array([0.93, 0.93, 0.95, 0.92]))
+    ticks = drive(controller, world, FLOOR, 60.0)
+    assert ticks[-1].command.status is DriveStatus.ARRIVED
+    off = np.array([after.state - tick.command.goal for tick, after in pairwise(ticks)])
+    assert np.hypot(off[:, 0], off[:, 1]).max() < 0.03
+
+
+def test_errors_die_away_as_those_of_a_critically_damped_oscillator() -> None:
+    dt, k = 0.05, 2.5
+    error, extra, seen = np.array([0.1, -0.3]), np.zeros(2), []
+    for _ in range(60):
+        seen.append(error)
+        extra = feedback(error, extra, k, dt)
+        error = error - dt * extra
+    z = math.exp(-k * dt)
+    n = np.arange(60)[:, None]
+    first = seen[1] / z - seen[0]  # of (a + b n) z^n
+    assert np.allclose(seen, (seen[0] + n * first) * z**n, atol=1e-12)
+    assert (np.abs(seen[-1]) < 0.01 * np.abs(seen[0])).all()
+    assert (np.array(seen)[:, 0] > 0.0).all(), "it does not swing over"
+
+
+def test_a_moved_and_turned_world_gets_the_same_commands() -> None:
+    path, move, turn = PATHS["arc"], np.array([0.5, -0.25]), math.pi / 2
+    box = (1.21, 1.31, 1.39, 1.49)
+    c, s = math.cos(turn), math.sin(turn)
+    other = path.copy()
+    other[:, :2] = path[:, :2] @ np.array([[c, s], [-s, c]]) + move
+    other[:, 2] += turn
+    placed = (move[0] - box[3], move[1] + box[0], move[0] - box[1], move[1] + box[2])
+    runs = []
+    for way, floor in ((path, FLOOR.with_box(*box)), (other, FLOOR.with_box(*placed))):
+        controller, world = made(way, noise=np.zeros(4))
+        runs.append(np.array([tick.sent for tick in drive(controller, world, floor, 6.0)]))
+    assert np.allclose(runs[0], runs[1], atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_limits_hold_for_random_plans_floors_and_starts(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    limits = CartLimits(
+        speed=rng.uniform(0.1, 1.0),
+        yaw_rate=rng.uniform(0.1, 1.0),
+        articulation_rate=rng.uniform(0.1, 1.0),
+        acceleration=rng.uniform(0.2, 2.0),
+    )
+    settings = CartSettings(limits=limits, delay=0.05, off_path=10.0, off_angle=10.0)
+    path = rng.uniform(-0.7, 0.7, (8, 4))
+    cells = np.where(rng.random((240, 240)) < 0.0004, 254, 0).astype(np.uint8)
+    controller, world = made(path, settings)
+    world.state += rng.normal(0, 0.03, 4)
+    world.__post_init__()
+    ticks = drive(controller, world, Costs(cells), 4.0, lambda w: {"scan_time": w.now - rng.uniform(0.0, 0.2)})
+    assert_within_limits(ticks, limits)
+    assert all(limits.articulation[0] - 0.05 < tick.state[3] < limits.articulation[1] + 0.05 for tick in ticks)
+
+
+@pytest.mark.parametrize("name", ["straight", "arc", "aside", "articulated"])
+@pytest.mark.parametrize("appears", [0.0, 2.5])
+def test_it_stops_before_what_appears_ahead_and_goes_on_when_that_is_gone(name: str, appears: float) -> None:
+    path = PATHS[name]
+    ring = np.array(outline_at(path[-1]).centroid.coords[0])
+    blocked = FLOOR.with_box(*(ring - 0.05), *(ring + 0.05))
+    thing = shapely.box(*(ring - 0.05), *(ring + 0.05))
+
+    def floor(now: float) -> Costs:
+        return blocked if appears <= now < 7.0 else FLOOR
+
+    controller, world = made(path)
+    ticks = drive(controller, world, floor, 40.0)
+    assert_within_limits(ticks, SETTINGS.limits)
+    while_there = [tick for tick in ticks if appears <= tick.now < 7.0]
+    assert min(outline_at(tick.state).distance(thing) for tick in while_there) > 0.0
+    last = while_there[-1]
+    assert last.command.status is DriveStatus.BLOCKED and last.command.cause is Cause.OBSTACLE
+    assert np.abs(last.rates).max() < 0.01
+    assert ticks[-1].command.status is DriveStatus.ARRIVED
+
+
+def test_what_appears_at_the_braking_distance_is_not_touched() -> None:
+    settings, limits = SETTINGS, SETTINGS.limits
+    controller, world = made(straight(3.0), noise=np.zeros(4))
+    ticks = drive(controller, world, FLOOR, 3.0)
+    speed = ticks[-1].sent[0]
+    assert speed == pytest.approx(limits.speed, rel=0.01)
+    front = world.state[0] + 0.65 + 0.9
+    reaction = settings.period + settings.delay + world.lag + 0.02
+    way = speed**2 / (2 * limits.braking) + speed * reaction + settings.margin + FLOOR.resolution
+    wall = FLOOR.with_box(front + way, -0.1, front + way + 0.1, 0.1)
+    after = drive(controller, world, wall, 2.0)
+    assert after[-1].state[0] + 0.65 + 0.9 < front + way
+    assert np.abs(after[-1].rates).max() < 0.01
+
+
+def test_after_its_patience_it_asks_for_a_new_plan() -> None:
+    controller, world = made(straight(2.0), SETTINGS.model_copy(update={"patience": 1.0}))
+    ticks = drive(controller, world, FLOOR.with_box(2.2, -0.1, 2.4, 0.1), 20.0)
+    assert ticks[-1].command.status is DriveStatus.REPLAN
+    assert ticks[-1].command.cause is Cause.OBSTACLE
+    assert "in the way" in ticks[-1].command.reason and "more than 1 s" in ticks[-1].command.reason
+
+
+def test_it_is_slower_where_something_is_near_and_not_where_it_is_far() -> None:
+    slowest = []
+    for gap in (0.03, 0.08, 0.5):
+        floor = FLOOR.with_box(0.5, 0.334 + gap, 3.0, 1.5)
+        controller, world = made(straight(1.1), noise=np.zeros(4))
+        ticks = drive(controller, world, floor, 30.0)
+        assert ticks[-1].command.status is DriveStatus.ARRIVED
+        middle = [tick for tick in ticks if 0.4 < tick.state[0] < 0.7]
+        slowest.append(min(tick.sent[0] for tick in middle))
+        assert {tick.command.cause for tick in middle} == {Cause.NEAR if gap < 0.15 else Cause.NONE}
+    assert slowest[0] < 0.6 * slowest[2] and slowest[0] < slowest[1] < slowest[2]
+
+
+def test_something_marked_inside_the_footprint_is_said_to_be_there() -> None:
+    controller, world = made(straight(2.0))
+    ticks = drive(controller, world, FLOOR.with_box(1.0, 0.0, 1.02, 0.02), 1.0)
+    assert all(tick.command.status is DriveStatus.BLOCKED for tick in ticks)
+    assert {tick.command.cause for tick in ticks} == {Cause.FOOTPRINT}
+    assert not np.any([tick.sent for tick in ticks])
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.6])
+def test_a_laser_that_falls_silent_stops_it_within_0_3_s_of_the_last_scan(heading: float) -> None:
+    for path in (straight(2.5, heading), arc(1.0, 1.5, 0.5)):
+        controller, world = made(path)
+        silent = {}
+
+        def scans(w: object, silent: dict = silent) -> dict:
+            if w.now >= 2.0:
+                return {"scan_time": silent.setdefault("last", w.now - 0.03)}
+            return {"scan_time": w.now - 0.03}
+
+        ticks = drive(controller, world, FLOOR, 3.0, scans)
+        assert max(np.abs(tick.sent).max() for tick in ticks) > 0.2
+        late = [tick for tick in ticks if tick.now >= silent["last"] + 0.3]
+        assert not np.any([tick.sent for tick in late])
+        assert np.abs(late[1].rates).max() < 0.02, "but for the lag of the drives"
+        assert late[-1].command.status is DriveStatus.WAITING and late[-1].command.cause is Cause.SCAN
+        assert_within_limits(ticks, SETTINGS.limits)
+
+
+def test_however_fast_it_may_go_it_only_goes_as_fast_as_it_can_stop() -> None:
+    fast = SETTINGS.model_copy(update={"limits": CartLimits(speed=1.0)})
+    controller, world = made(straight(2.5), fast)
+    ticks = drive(controller, world, FLOOR, 8.0)
+    most = fast.limits.braking * (fast.stop_within - 0.02 - fast.period - fast.delay)
+    assert max(tick.sent[0] for tick in ticks) <= most + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        ({"pose": None}, Cause.POSE),
+        ({"pose": np.array([0.0, np.nan, 0.0])}, Cause.POSE),
+        ({"pose_time": -1.0}, Cause.POSE),
+        ({"pose_time": 1e9}, Cause.POSE),
+        ({"articulation": None}, Cause.ARTICULATION),
+        ({"articulation": math.inf}, Cause.ARTICULATION),
+        ({"articulation_time": -1.0}, Cause.ARTICULATION),
+        ({"scan_time": -math.inf}, Cause.SCAN),
+        ({"scan_time": math.nan}, Cause.SCAN),
+    ],
+)
+def test_percepts_that_are_old_or_no_numbers_stop_it_until_they_are_good_again(change: dict, cause: Cause) -> None:
+    controller, world = made(straight(1.0))
+    ticks = drive(controller, world, FLOOR, 20.0, lambda w: change if 1.5 <= w.now < 2.5 else {})
+    bad = [tick for tick in ticks if 1.5 <= tick.now < 2.5]
+    assert {tick.command.status for tick in bad} == {DriveStatus.WAITING}
+    assert {tick.command.cause for tick in bad} == {cause}
+    assert not np.any(bad[-1].sent) and bad[0].command.reason
+    assert ticks[-1].command.status is DriveStatus.ARRIVED
+    assert_within_limits(ticks, SETTINGS.limits)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"holds": (True, False)}, "the right one has lost it"),
+        ({"holds": (False, True)}, "the left one has lost it"),
+        ({"holds": (False, False)}, "neither"),
+        ({"misfit": 0.05}, "0.050 m off"),
+        ({"grip_offset": (0.1, 0.0)}, "0.100 m away"),
+        ({"grip_offset": (np.nan, 0.0)}, "nan m away"),
+    ],
+)
+def test_a_cart_that_slips_from_a_hand_stops_it_for_good(change: dict, words: str) -> None:
+    controller, world = made(straight(1.0))
+    ticks = drive(controller, world, FLOOR, 3.0, lambda w: change if 1.5 <= w.now < 1.6 else {})
+    after = [tick for tick in ticks if tick.now >= 1.5]
+    assert {tick.command.status for tick in after} == {DriveStatus.FAILED}
+    assert after[0].command.cause is Cause.GRIP and words in after[0].command.reason
+    assert not np.any([tick.sent for tick in after[6:]])
+    assert_within_limits(ticks, SETTINGS.limits)
+
+
+def test_one_hand_alone_cannot_tell_a_misfit() -> None:
+    controller, world = made(straight(0.5))
+    ticks = drive(controller, world, FLOOR, 10.0, lambda w: {"misfit": math.nan})
+    assert ticks[-1].command.status is DriveStatus.ARRIVED
+
+
+def test_a_robot_that_was_pushed_away_asks_for_a_new_plan() -> None:
+    controller, world = made(straight(1.0))
+    world.state = world.state + np.array([0.0, 0.3, 0.0, 0.0])
+    world.__post_init__()
+    ticks = drive(controller, world, FLOOR, 1.0)
+    assert ticks[-1].command.status is DriveStatus.REPLAN and ticks[-1].command.cause is Cause.OFF_PLAN
+
+
+def test_a_base_that_does_not_move_is_not_waited_for_for_ever() -> None:
+    controller, world = made(straight(1.0), slip=np.zeros(4))
+    ticks = drive(controller, world, FLOOR, 20.0)
+    assert ticks[-1].command.status is DriveStatus.REPLAN
+    assert ticks[-1].command.cause in (Cause.LAG, Cause.OFF_PLAN)
+
+
+def test_unknown_floor_blocks_only_where_it_is_told_to() -> None:
+    unknown = Costs(np.where(np.arange(320)[None] * 0.025 - 3.0 > 2.0, 255, 0).repeat(320, 0).astype(np.uint8))
+    for blocks, status in ((False, DriveStatus.ARRIVED), (True, DriveStatus.BLOCKED)):
+        chosen = SETTINGS.model_copy(update={"unknown_blocks": blocks, "patience": 100.0})
+        controller, world = made(straight(1.0), chosen)
+        assert drive(controller, world, unknown, 8.0)[-1].command.status is status
+
+
+def test_kernels_are_compiled_without_a_robot() -> None:
+    compile_kernels(SETTINGS)
+
+
+def test_a_plan_of_one_pose_is_done_at_once() -> None:
+    controller, world = made(np.zeros((1, 4)))
+    assert drive(controller, world, FLOOR, 1.0)[-1].command.status is DriveStatus.ARRIVED
+
+
+def test_the_next_plan_takes_over_on_the_way() -> None:
+    controller, world = made(straight(2.0), noise=np.zeros(4))
+    last = drive(controller, world, FLOOR, 3.0)[-1]
+    here = np.array([*world.state])
+    path = straight(1.0) + here
+    following = CartController(CartPlan.timed(path, SETTINGS.limits), pr2_body(), SETTINGS, last.sent)
+    ticks = drive(following, world, FLOOR, 20.0)
+    assert ticks[-1].command.status is DriveStatus.ARRIVED
+    assert np.abs(ticks[0].sent - last.sent).max() <= SETTINGS.limits.braking * 0.05 + 1e-9
+
+
+def test_arms_that_cannot_follow_hold_the_base_back() -> None:
+    rng = np.random.default_rng(2)
+    speed = np.full((2, 7), 0.05)
+    arms = ArmState(rng.normal(size=(2, 6, 7)), np.zeros((2, 7)), np.full((2, 7), -2.0), np.full((2, 7), 2.0), speed)
+    runs = {}
+    for name, given in (("weak", arms), ("strong", dataclasses.replace(arms, speed=100.0 * speed))):
+        controller, world = made(PATHS["articulated"], noise=np.zeros(4))
+        ticks = drive(controller, world, FLOOR, 60.0, lambda w, given=given: {"arms": given})
+        assert ticks[-1].command.status is DriveStatus.ARRIVED
+        assert all((np.abs(tick.command.joint_rates) <= given.speed + 1e-9).all() for tick in ticks)
+        off = np.array([tick.state - tick.command.goal for tick in ticks])
+        assert np.abs(off[:, 2:]).max() < math.radians(5.0)
+        runs[name] = ticks[-1].now
+    assert runs["weak"] > 1.5 * runs["strong"]
+
+
+def test_hostile_input_is_refused_in_words() -> None:
+    controller, world = made(straight(1.0))
+    for costs, words in (
+        (Costs(np.zeros((3, 3))), "uint8"),
+        (Costs(np.zeros(3, dtype=np.uint8)), "rows, columns"),
+        (Costs(np.zeros((0, 3), dtype=np.uint8)), "rows, columns"),
+        (Costs(np.zeros((3, 3), dtype=np.uint8), 0.0), "resolution"),
+        (Costs(np.zeros((3, 3), dtype=np.uint8), 0.1, (0.0, math.nan)), "origin"),
+    ):
+        with pytest.raises(ControlError, match=words):
+            controller.step(0.0, world.percept(costs))
+    with pytest.raises(ControlError, match="finite time"):
+        controller.step(math.nan, world.percept(FLOOR))
+    with pytest.raises(ControlError, match="4 finite numbers"):
+        CartController(CartPlan.timed(straight(1.0), SETTINGS.limits), pr2_body(), SETTINGS, np.zeros(3))
+    for changes, words in (
+        ({"stop_within": 0.06}, "stop_within"),
+        ({"near": 0.0}, "near"),
+        ({"limits": {"braking": 0.1}}, "braking"),
+        ({"frequency": math.nan}, "finite|less"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            CartSettings(**changes)
+
+
+def test_a_clock_that_stands_or_runs_back_does_not_make_it_jump() -> None:
+    controller, world = made(straight(1.0))
+    ticks = drive(controller, world, FLOOR, 1.0)
+    before = ticks[-1].sent
+    again = controller.step(
+        ticks[-1].now,
+        world.percept(FLOOR, pose_time=ticks[-1].now, articulation_time=ticks[-1].now, scan_time=ticks[-1].now),
+    )
+    assert np.allclose([*again.twist, again.articulation_rate], before, atol=1e-9)
