@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pbrl_bringup.cart.navigator import PATIENCE, Answer, Navigator, PlannerCall
-from pbrl_bringup.cart.outline import GRIP, frame_at_grip, motions
+from pbrl_bringup.cart.outline import motions
 from pbrl_bringup.cart.senses import CartSenses
 from pbrl_control.cart import CartBody, CartCommand, CartController, CartLimits, CartPlan, CartSettings, DriveStatus
 from pbrl_control.planar import Array, compose, wrap
@@ -72,8 +72,8 @@ class Score:
 
     Attributes:
         contacts: with people, furniture, walls.
-        nearest_person: least distance of robot or cart to somebody [m].
-        nearest_thing: to anything else [m].
+        nearest_person: least distance of robot or cart to somebody [m]; None: further than is looked.
+        nearest_thing: to anything else, likewise [m].
         position_errors: of the base from the plan's goal of the moment, as the robot has it, a tick [m].
         angle_errors: the greater one of heading and articulation, likewise [rad].
         goal_error: of the base to the goal, truly [m].
@@ -82,8 +82,8 @@ class Score:
     """
 
     contacts: tuple[Touch, ...]
-    nearest_person: float
-    nearest_thing: float
+    nearest_person: float | None
+    nearest_thing: float | None
     position_errors: tuple[float, ...]
     angle_errors: tuple[float, ...]
     goal_error: float
@@ -251,8 +251,8 @@ class CartRun:
 
     def _note_errors(self, command: CartCommand) -> None:
         if command.status is DriveStatus.MOVING and np.isfinite(command.error).all():
-            self.errors.position.append(math.hypot(*command.error[:2]))
-            self.errors.angle.append(float(np.abs(command.error[2:]).max()))
+            self.errors.position.append(round(math.hypot(*command.error[:2]), 5))
+            self.errors.angle.append(round(float(np.abs(command.error[2:]).max()), 5))
 
     def _traced(self, now: float, command: CartCommand | None) -> Trace:
         office = self.session.office
@@ -305,8 +305,8 @@ def outcome(run: CartRun) -> CartOutcome:
     places = np.array([each.base[:2] for each in run.trace]).reshape(-1, 2)
     score = Score(
         tuple(Touch(each.mover, each.other, each.person, each.start, each.peak) for each in session.contacts),
-        session.clearance.person,
-        session.clearance.thing,
+        _finite(session.clearance.person),
+        _finite(session.clearance.thing),
         tuple(run.errors.position),
         tuple(run.errors.angle),
         float(np.hypot(*(pose[:2] - run.goal[:2]))),
@@ -332,4 +332,5 @@ def outcome(run: CartRun) -> CartOutcome:
     )
 
 
-__all__ = ["GRIP", "CartOutcome", "CartRun", "Score", "Touch", "Trace", "frame_at_grip", "outcome", "run_cart"]
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

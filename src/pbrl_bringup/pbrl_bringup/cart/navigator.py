@@ -50,10 +50,10 @@ class PlannerCall:
         time: simulated [s].
         answer: what it came to.
         reason: in words, where there is no plan.
-        epsilon: bound in the end; inf without a plan.
+        epsilon: bound in the end; None without a plan.
         expansions_first: until the first plan; 0 without one.
         expansions: in all.
-        seconds_first: of this process's own work until the first plan; inf without one.
+        seconds_first: of this process's own work until the first plan; None without one.
         seconds: likewise until the end.
         cost: of the plan; -1 without one.
     """
@@ -61,10 +61,10 @@ class PlannerCall:
     time: float
     answer: Answer
     reason: str
-    epsilon: float
+    epsilon: float | None
     expansions_first: int
     expansions: int
-    seconds_first: float
+    seconds_first: float | None
     seconds: float
     cost: int
 
@@ -122,10 +122,10 @@ class Navigator:
                 now,
                 answer,
                 made.reason,
-                made.epsilon,
+                made.epsilon if made.found else None,
                 made.history[0].expansions if made.history else 0,
                 made.expansions,
-                first[0] if first else math.inf,
+                first[0] if first else None,
                 time.process_time() - began,
                 made.cost,
             )
@@ -134,7 +134,7 @@ class Navigator:
 
     def _failed(self, now: float, answer: Answer, reason: str, began: float) -> None:
         seconds = time.process_time() - began
-        self.calls.append(PlannerCall(now, answer, reason, math.inf, 0, 0, math.inf, seconds, -1))
+        self.calls.append(PlannerCall(now, answer, reason, None, 0, 0, None, seconds, -1))
 
 
 def grid_of(field: CostField) -> CostGrid:
@@ -186,4 +186,3 @@ def with_room(lattice: Lattice, pose: Array) -> CostGrid:
     taken = cells[y[on], x[on]] >= grid.blocked
     cells[y[on][taken], x[on][taken]] = NEAREST
     return CostGrid(cells, grid.resolution, grid.origin, grid.blocked, grid.lethal)
-

@@ -16,13 +16,13 @@ GRIP = (0.65, 0.0)
 POSTURE = "edge_grasp_low"
 """Of the simulator's: elbows below the hands; with elbows out the robot is 1.3 m wide and fits through no door."""
 ELBOWS = np.array([[0.0, 0.30], [-0.20, 0.43], [-0.45, 0.43], [-0.45, -0.43], [-0.20, -0.43], [0.0, -0.30]])
-"""Around both arms, in the cart's frame at the grip [m]: as the cart turns, elbows swing out on the other side as if they
-were fixed to it."""
+"""Around both arms, in the cart's frame at the grip [m]: when it turns, elbows swing out on the other side as if fixed
+to it."""
 CASTERS = 0.03
 """[m] by which swivelled casters can stick out of the cart."""
 KEPT = 0.04
-"""[m] that plans stay away from everything beyond what the local controller does: what laser, localiser and drive are off
-by. A plan without it leads to where the controller does not go on, and so does the next one."""
+"""[m] that plans stay away from everything beyond what the local controller does: what laser, localiser and drive are
+off by. A plan without it leads to where the controller does not go on, and so does the next one."""
 ARTICULATION = 0.4
 """Largest that is planned [rad]; at 0.47 a shoulder is at its stop."""
 

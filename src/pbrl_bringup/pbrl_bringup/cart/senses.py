@@ -8,11 +8,12 @@ import numpy as np
 
 from bullet_sim.observations import GraspState, JointStates, KnownScene, RobotDescription
 from pbrl_bringup.cart.outline import GRIP, frame_at_grip, pr2_with
+from pbrl_bringup.cart.shoulders import with_shoulders
 from pbrl_bringup.cart.whereabouts import Whereabouts
 from pbrl_control.cart import CartBody, CartPercept, CartSight, choose_sight
 from pbrl_control.planar import Array, compose
 from pbrl_control.pr2_arms import Pr2Arms
-from pbrl_planner.costmap import Costmap, CostField, CostmapSettings, EvidenceSettings, RangeScan, Recovery, StaticMap
+from pbrl_planner.costmap import CostField, Costmap, CostmapSettings, EvidenceSettings, RangeScan, Recovery, StaticMap
 from pr2_cart_sim.observations import BaseOdometry, CartReading, KnownMap, Localisation, Scan
 
 LASER = "base_laser_link"
@@ -21,6 +22,7 @@ WHOLE = CostmapSettings(mark_range=6.0, clear_range=8.0, evidence=EvidenceSettin
 """Of the floor that is planned on: what was seen of it is remembered for longer than a room is left."""
 SIGHT_AGE, MISFIT = 0.25, 0.03
 """As old [s] and as far off [m] a reading of the cart may be before the next source is asked."""
+
 
 class CartSenses:
     """The latest of every stream, and both costmaps, in `map` as far as the robot knows where that is.
@@ -43,6 +45,7 @@ class CartSenses:
         self.whole: Costmap | None = None
         self.local = Costmap(LOCAL)
         self._settings = CostmapSettings(**{**WHOLE.model_dump(), "resolution": resolution})
+        self._static: StaticMap | None = None
         self._arms: Pr2Arms | None = None
         self._laser = np.zeros(3)
         self._joints: JointStates | None = None
@@ -70,7 +73,7 @@ class CartSenses:
             0.0,
             chosen.time,
             self.local.time,
-            self.local.field(now),
+            with_shoulders(self.local.field(now), self._static, self._own(now)),
             ("left" in self._held, "right" in self._held),
             chosen.misfit,
             chosen.grip_offset(GRIP),
@@ -89,7 +92,7 @@ class CartSenses:
 
     def floor(self, now: float) -> CostField | None:
         """Return costs of the whole floor at `now` [s]; None: no map has come yet."""
-        return None if self.whole is None else self.whole.field(now)
+        return None if self.whole is None else with_shoulders(self.whole.field(now), self._static, self._own(now))
 
     def recover(self, now: float) -> list[Recovery]:
         """Take out of both costmaps what is marked where robot and cart are, and what was seen too seldom."""
@@ -117,7 +120,8 @@ class CartSenses:
     @hear.register
     def _(self, observation: KnownMap) -> None:
         grid = observation.grid
-        self.whole = Costmap.over(StaticMap(grid.cells, grid.resolution, grid.origin), self._settings)
+        self._static = StaticMap(grid.cells, grid.resolution, grid.origin)
+        self.whole = Costmap.over(self._static, self._settings)
 
     @hear.register
     def _(self, observation: GraspState) -> None:
