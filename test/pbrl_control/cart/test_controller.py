@@ -57,6 +57,32 @@ def test_it_tracks_within_3_cm_and_2_degrees_despite_noise_and_delay(name: str) 
     assert np.hypot(*end[:2]) < SETTINGS.tolerance and np.abs(end[2:]).max() < SETTINGS.angle_tolerance
 
 
+@pytest.mark.parametrize("late", [{"delay": 0.1}, {"delay": 0.0, "lag": 0.0}, {"lag": 0.1}, {"sense_delay": 0.1}])
+@pytest.mark.parametrize("name", ["articulated", "reversal"])
+def test_delays_that_are_not_those_it_was_told_do_not_make_it_swing(name: str, late: dict) -> None:
+    controller, world = made(PATHS[name], **late)
+    ticks = drive(controller, world, FLOOR, 40.0)
+    assert ticks[-1].command.status is DriveStatus.ARRIVED
+    off = np.array([after.state - tick.command.goal for tick, after in pairwise(ticks)])
+    assert np.hypot(off[:, 0], off[:, 1]).max() < 0.03
+    assert np.abs(off[:, 2:]).max() < math.radians(2.0)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_is_touched_among_random_things(seed: int) -> None:
+    rng, path = np.random.default_rng(seed), list(PATHS.values())[seed % len(PATHS)]
+    begin, floor, things = outline_at(path[0]), FLOOR, []
+    for place in rng.uniform((-1.0, -1.8), (3.2, 1.8), (14, 2)):
+        thing = shapely.box(*(place - 0.02), *(place + 0.02))
+        if thing.distance(begin) > 0.1:
+            things.append(thing)
+            floor = floor.with_box(*thing.bounds)
+    controller, world = made(path, noise=np.zeros(4))
+    ticks = drive(controller, world, floor, 10.0)
+    assert min(outline_at(tick.state).distance(thing) for tick in ticks[::2] for thing in things) > 0.0
+    assert_within_limits(ticks, SETTINGS.limits)
+
+
 @pytest.mark.parametrize("name", ["arc", "articulated"])
 def test_wheels_that_slip_and_arms_that_give_way_do_not_lead_it_off(name: str) -> None:
     controller, world = made(PATHS[name], slip=np.array([0.93, 0.93, 0.95, 0.92]))
@@ -338,7 +364,7 @@ def test_hostile_input_is_refused_in_words() -> None:
         CartController(CartPlan.timed(straight(1.0), SETTINGS.limits), pr2_body(), SETTINGS, np.zeros(3))
     for changes, words in (
         ({"stop_within": 0.06}, "stop_within"),
-        ({"near": 0.0}, "near"),
+        ({"near": 0.0, "margin": 0.1}, "near"),
         ({"limits": {"braking": 0.1}}, "braking"),
         ({"frequency": math.nan}, "finite|less"),
     ):

@@ -186,6 +186,18 @@ def test_recovery_everywhere_takes_what_is_doubtful_and_leaves_what_is_confirmed
     assert costmap.field(0.2).cost(1.03, 0.01) == 254
 
 
+def test_recovery_of_what_nobody_sees_leaves_what_was_seen_just_now() -> None:
+    costmap = Costmap(settings_of())
+    for k in range(4):
+        costmap.observe(scan_of([1.02], time=0.05 * k), (0.0, 0.01, 0.0))
+    costmap.observe(scan_of([0.72], time=3.0), (0.0, 0.01, math.pi))
+    assert len(costmap.clear_unseen(3.0, 5.0).places) == 0
+    assert np.allclose(costmap.clear_unseen(3.0, 2.0).places, [[1.025, 0.025]])
+    assert costmap.field(3.0).cost(-0.71, 0.01) == 254
+    with pytest.raises(PlannerError, match="finite"):
+        costmap.clear_unseen(math.nan, 2.0)
+
+
 def test_recovery_leaves_the_map_and_says_how_much_of_it_is_in_the_way() -> None:
     cells = np.zeros((80, 80), dtype=np.int8)
     cells[40, 42:46] = 100

@@ -21,6 +21,7 @@ BENCHES = {
     "concealed": "recordings with one thing concealed: is it noticed, named, and does the repair predict",
     "tags": "tags found in rendered pictures of six cameras, and the model of their noise, against the truth",
     "control": "the body controller: Jacobians, limits, tick, jitter, steering; object paths and grasps in Bullet",
+    "cart": "robot and cart on a plan: how near they stay to it, ticks, costmaps, a laser that falls silent",
     "namo": "the planner among movable obstacles: time, unreachable goals, random rooms, against a kinodynamic RRT",
     "lattice": "the lattice planner: cubicles beside SBPL's figures, a cart through narrow doors, what a turn sweeps",
     "next-experiment": "pushes until it is known what was left out, chosen by information or at random",

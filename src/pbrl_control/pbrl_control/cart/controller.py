@@ -28,7 +28,7 @@ QUICKEST = 4.0  # [1/s] at which the goal's pace grows at most
 CREEPING = 0.05  # pace below which there is no progress
 ROUNDING = 1e-6  # of a pace
 STILL = 0.02  # [m/s, rad/s] standing
-WINDOW = 1.0  # [s] of the plan about the goal in which it is looked for again after a stop
+WINDOW = 0.5  # [s] of the plan about the goal in which it is looked for again after a stop
 
 
 class CartController:

@@ -96,7 +96,7 @@ class CartSettings(Section):
         off_angle: the same of heading and articulation [rad].
         near: distance to something lethal below which the robot goes slower [m].
         near_share: of its speed that is left where something is almost touched.
-        margin: distance that counts as touching [m].
+        margin: distance that counts as touching [m]; not more than what the planner keeps, or its plans are refused.
         look_ahead: [s] of the plan that has to be free.
         reserve: [s] of the plan kept from what is in the way.
         unknown_blocks: whether cells that nobody saw are not to be entered, those outside of the costmap among them.
@@ -124,7 +124,7 @@ class CartSettings(Section):
     off_angle: Positive = 0.35
     near: Annotated[NotNegative, Field(le=0.5)] = 0.15
     near_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.4
-    margin: Annotated[NotNegative, Field(le=0.3)] = 0.01
+    margin: Annotated[NotNegative, Field(le=0.3)] = 0.0
     look_ahead: Annotated[Positive, Field(le=5.0)] = 1.0
     reserve: Annotated[NotNegative, Field(le=1.0)] = 0.15
     unknown_blocks: bool = False

@@ -39,7 +39,7 @@ def limit_rates(
     articulation: float,
     found: Array,
 ) -> None:
-    """Write the rates (4,) nearest to a wish that may be commanded; see `within_limits`.
+    """Write the rates (4,) nearest to a wish that may be commanded; see `RateLimits.nearest`.
 
     Args:
         wish: (4,) finite.

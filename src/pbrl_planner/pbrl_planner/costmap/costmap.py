@@ -236,6 +236,16 @@ class Costmap:
         doubtful = self._evidence < self.settings.evidence.confirmed
         return self._take_out(doubtful, f"cleared obstacles with evidence below {self.settings.evidence.confirmed}")
 
+    def clear_unseen(self, now: float, age: float) -> Recovery:
+        """Take out what nobody has seen for so long [s]: who stood in the shadow of the cart may have gone.
+
+        Raises:
+            PlannerError: a number is not finite.
+        """
+        if not (math.isfinite(now) and math.isfinite(age)):
+            raise PlannerError(f"costmap: expected a finite time and age, got {now} and {age} s")
+        return self._take_out(now - self._last > age, f"cleared obstacles that nobody has seen for {age:g} s")
+
     def _take_out(self, where: NDArray[np.bool_], what: str) -> Recovery:
         gone = where & (self._evidence > 0)
         rows, columns = np.nonzero(gone)
