@@ -105,11 +105,13 @@ class Navigator:
             lattice = Lattice(with_room(lattice, start), self._motions)
             begin = free_start(lattice, start)
         if begin is None:
-            return self._failed(now, Answer.SHUT_IN, "no state of the lattice near the robot is free", began)
+            self._note_failure(now, Answer.SHUT_IN, "no state of the lattice near the robot is free", began)
+            return None
         try:
             problem = LatticeProblem(lattice, begin, goal)
         except PlannerError as error:
-            return self._failed(now, Answer.GOAL_TAKEN, str(error), began)
+            self._note_failure(now, Answer.GOAL_TAKEN, str(error), began)
+            return None
         first: list[float] = []
 
         def note(_: LatticePlan) -> None:
@@ -132,7 +134,7 @@ class Navigator:
         )
         return made if made.found else None
 
-    def _failed(self, now: float, answer: Answer, reason: str, began: float) -> None:
+    def _note_failure(self, now: float, answer: Answer, reason: str, began: float) -> None:
         seconds = time.process_time() - began
         self.calls.append(PlannerCall(now, answer, reason, None, 0, 0, None, seconds, -1))
 

@@ -65,6 +65,9 @@ def motions(length: float, width: float, coarse: bool = False) -> Motions:
         coarse: half as many headings, cells of twice the size: for tests.
     """
     body = pr2_with(rectangle(-length / 2.0, length / 2.0, width / 2.0), KEPT)
-    said = {"resolution": 0.05, "headings": 8, "articulations": 3, "stride": 4} if coarse else {}
-    settings = GeneratorSettings(**{"articulation_limit": ARTICULATION, **said})
+    settings = GeneratorSettings(articulation_limit=ARTICULATION)
+    if coarse:
+        settings = GeneratorSettings(
+            resolution=0.05, headings=8, articulations=3, stride=4, articulation_limit=ARTICULATION
+        )
     return Motions(generate(settings), Pace(speed=0.35, yaw_rate=0.35, articulation_rate=0.3), body)

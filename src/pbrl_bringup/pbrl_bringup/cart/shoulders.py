@@ -56,5 +56,5 @@ def _covered(field: CostField, own: Sequence[Array]) -> Mask:
     found = np.zeros(field.cells.shape, dtype=np.uint8)
     for ring in own:
         corners = np.floor((ring - field.origin) / field.resolution).astype(np.int32)
-        cv2.fillConvexPoly(found, cv2.convexHull(corners), 1)
+        cv2.fillConvexPoly(found, cv2.convexHull(corners), (1,))
     return cv2.dilate(found, np.ones((3, 3), np.uint8)) == 1

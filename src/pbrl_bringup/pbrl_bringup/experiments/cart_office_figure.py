@@ -103,7 +103,8 @@ def draw_stops(axes: Axes, legs: Sequence[CartOutcome]) -> None:
     for status, (words, colour) in STOPS.items():
         places = [each.base[:2] for leg in legs for each in leg.trace if each.status == status and each.time > 0.5]
         if places:
-            axes.scatter(*np.array(places).T, s=30, color=colour, alpha=0.35, label=words, zorder=4)
+            x, y = np.array(places).T
+            axes.scatter(x, y, s=30, color=colour, alpha=0.35, label=words, zorder=4)
     touches = [
         min(leg.trace, key=lambda each: abs(each.time - touch.time)).base[:2]
         for leg in legs
@@ -111,6 +112,7 @@ def draw_stops(axes: Axes, legs: Sequence[CartOutcome]) -> None:
         if leg.trace
     ]
     if touches:
-        axes.scatter(*np.array(touches).T, s=120, marker="*", color="#ff0000", label="contact", zorder=5)
+        x, y = np.array(touches).T
+        axes.scatter(x, y, s=120, marker="*", color="#ff0000", label="contact", zorder=5)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", fontsize=8)
