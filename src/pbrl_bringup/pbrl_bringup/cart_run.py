@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from pbrl_bringup.cart.navigator import PATIENCE, Answer, Navigator, PlannerCall
+from pbrl_bringup.cart.navigator import PATIENCE, Answer, Navigator
+from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
 from pbrl_bringup.cart.outline import motions
 from pbrl_bringup.cart.senses import CartSenses
 from pbrl_control.cart import CartBody, CartCommand, CartController, CartLimits, CartPlan, CartSettings, DriveStatus
@@ -29,93 +29,11 @@ RETRY = 2.0
 """Time between two calls of the planner of which the first found nothing [s]."""
 REFRESH = 15.0
 """Time on one plan after which it is made again: the floor is better known by then [s]."""
+AHEAD, ENOUGH = 0.3, 1.5
+"""Way [m, rad] along a plan after which the next one begins; what is left of it at least for that to be worth it."""
 TRACED = 0.5
 """Between two points of the trace [s]."""
 SETTINGS = CartSettings(limits=CartLimits(articulation=(-0.45, 0.45)), delay=0.03, margin=0.015)
-
-
-@dataclass(frozen=True)
-class Trace:
-    """Where everything truly was: for pictures and scores.
-
-    Attributes:
-        time: [s].
-        base: (3,) [m, rad].
-        cart: (3,) of the cart's own frame [m, rad].
-        status: of the local controller; "planning" without one.
-        cause: why it was not at full speed.
-        people: (x, y) by name [m].
-    """
-
-    time: float
-    base: tuple[float, ...]
-    cart: tuple[float, ...]
-    status: str
-    cause: str
-    people: Mapping[str, tuple[float, ...]]
-
-
-@dataclass(frozen=True)
-class Touch:
-    """A contact: who of us touched whom, when [s] and with how much [N]."""
-
-    mover: str
-    other: str
-    person: bool
-    time: float
-    force: float
-
-
-@dataclass(frozen=True)
-class Score:
-    """What came of the drive, by the simulator's truth.
-
-    Attributes:
-        contacts: with people, furniture, walls.
-        nearest_person: least distance of robot or cart to somebody [m]; None: further than is looked.
-        nearest_thing: to anything else, likewise [m].
-        position_errors: of the base from the plan's goal of the moment, as the robot has it, a tick [m].
-        angle_errors: the greater one of heading and articulation, likewise [rad].
-        goal_error: of the base to the goal, truly [m].
-        goal_angle: likewise [rad].
-        way: of the base, truly [m].
-    """
-
-    contacts: tuple[Touch, ...]
-    nearest_person: float | None
-    nearest_thing: float | None
-    position_errors: tuple[float, ...]
-    angle_errors: tuple[float, ...]
-    goal_error: float
-    goal_angle: float
-    way: float
-
-
-@dataclass(frozen=True)
-class CartOutcome:
-    """What became of one leg.
-
-    Attributes:
-        reached: whether the robot says that it is there.
-        sentence: how it ended.
-        seconds: simulated [s].
-        calls: of the planner.
-        trace: the story.
-        score: by the truth.
-        goal: (3,) asked for.
-        room: corners of the floor [m].
-        plan: (n, 4) the last one [m, rad].
-    """
-
-    reached: bool
-    sentence: str
-    seconds: float
-    calls: tuple[PlannerCall, ...]
-    trace: tuple[Trace, ...]
-    score: Score
-    goal: tuple[float, ...]
-    room: tuple[tuple[float, ...], ...]
-    plan: tuple[tuple[float, ...], ...]
 
 
 @dataclass
@@ -224,7 +142,7 @@ class CartRun:
         else:
             going.blocked = None
             if now - going.since >= REFRESH and now >= self._next_plan:
-                self._set_out(now)
+                self._go_over(now, going, command.goal)
 
     def _set_out(self, now: float) -> None:
         """Plan from here, and drive that; without a plan go on with the old one, if any, and try again later."""
@@ -240,13 +158,25 @@ class CartRun:
         self.last_plan = made
         self._going = _Going(made, self._controller(made, here, body), now)
 
-    def _controller(self, made: LatticePlan, here: Array, body: CartBody) -> CartController:
-        """Return a controller that goes from here to the plan's start, then along it."""
-        poses = made.poses.copy()
-        poses[:, 2] += here[2] + wrap(float(poses[0, 2] - here[2])) - poses[0, 2]
+    def _go_over(self, now: float, going: _Going, aim: Array) -> None:
+        """Plan again from a little further along the plan that is driven; drive that where it is another."""
+        floor, body = self.senses.floor(now), self.senses.body
+        head = onward(going.plan, aim)
+        if floor is None or body is None or head is None:
+            return
+        self._next_plan, going.since = now + RETRY, now
+        made = self.navigator.plan(now, floor, head[-1], self.goal)
+        if made is None or np.array_equal(made.primitives, going.plan.primitives[-len(made.primitives) :]):
+            return
+        self.last_plan = made
+        self._going = _Going(made, self._controller(made, head, body), now)
+
+    def _controller(self, made: LatticePlan, head: Array, body: CartBody) -> CartController:
+        """Return a controller that goes along poses (m, 4) to the plan's start, then along it."""
+        poses = np.vstack([np.atleast_2d(head), made.poses])
         low, high = self._settings.limits.articulation
-        first = np.array([*here[:3], min(max(float(here[3]), low), high)])
-        plan = CartPlan.timed(np.vstack([first, poses]), self._settings.limits, self._settings.share)
+        poses[:, 3] = np.clip(poses[:, 3], low, high)
+        plan = CartPlan.timed(poses, self._settings.limits, self._settings.share)
         return CartController(plan, body, self._settings, self._sent)
 
     def _note_errors(self, command: CartCommand) -> None:
@@ -330,6 +260,30 @@ def outcome(run: CartRun) -> CartOutcome:
         tuple(tuple(map(float, corner)) for corner in room),
         tuple(tuple(map(float, pose)) for pose in poses),
     )
+
+
+def onward(plan: LatticePlan, aim: Array) -> Array | None:
+    """Return the poses (m, 4) of a plan from where it is driven now to a state of the lattice that lies ahead.
+
+    Args:
+        plan: that is driven.
+        aim: (4,) of it that the controller goes for now.
+
+    Returns:
+        None where the plan ends soon.
+    """
+    off = plan.poses - aim
+    off[:, 2] = np.mod(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi
+    here = int(np.argmin(np.sum(off**2, axis=1)))
+    left = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(plan.poses[here:], axis=0)).sum(axis=1))))
+    ahead = [
+        k
+        for k in range(here + 1, len(plan.poses))
+        if left[k - here] >= AHEAD and (plan.waypoints == plan.poses[k]).all(axis=1).any()
+    ]
+    if not ahead or left[-1] < ENOUGH:
+        return None
+    return np.vstack([aim, plan.poses[here + 1 : ahead[0] + 1]])
 
 
 def _finite(value: float) -> float | None:

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from pbrl_bringup.cart.navigator import Answer, PlannerCall, free_start, grid_of, with_room
+from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
 from pbrl_bringup.cart.outline import ARTICULATION, GRIP, frame_at_grip, motions, pr2_with
 from pbrl_bringup.cart.shoulders import BEYOND, with_shoulders
 from pbrl_bringup.cart.whereabouts import Whereabouts
-from pbrl_bringup.cart_run import CartOutcome, Score, Touch, Trace
+from pbrl_bringup.cart_run import AHEAD, onward
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments.cart_kept import keep_leg, read_leg
 from pbrl_bringup.experiments.cart_office import route, rows_of
 from pbrl_control.planar import compose, inverse, wrap
 from pbrl_planner.costmap import LETHAL, CostField, StaticMap
-from pbrl_planner.lattice import Lattice
+from pbrl_planner.lattice import Lattice, LatticeProblem, plan
 
 
 @pytest.fixture
@@ -109,6 +110,17 @@ def test_a_robot_too_near_to_something_still_finds_a_start() -> None:
     opened = with_room(shut, pose)
     assert free_start(Lattice(opened, swept), pose) is not None
     assert (opened.cells == 254).any(), "elsewhere it stays closed"
+
+
+def test_a_plan_goes_on_from_a_state_ahead_on_the_one_before() -> None:
+    lattice = Lattice(grid_of(free_field()), motions(1.0, 0.55, True))
+    made = plan(LatticeProblem(lattice, (1.025, 2.025, 0.0), (3.025, 2.625, 0.0)))
+    aim = 0.5 * (made.poses[3] + made.poses[4])
+    head = onward(made, aim)
+    assert np.array_equal(head[0], aim)
+    assert free_start(lattice, head[-1])[:2] == pytest.approx(head[-1, :2]), "it ends on the lattice"
+    assert AHEAD <= np.abs(np.diff(head, axis=0)).sum() < AHEAD + 0.6
+    assert onward(made, made.poses[-4]) is None, "so near to the end it is not worth it"
 
 
 def test_shoulders_grow_what_is_not_in_the_map_but_not_into_the_robot() -> None:

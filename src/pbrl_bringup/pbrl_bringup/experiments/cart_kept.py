@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from pbrl_bringup.cart_run import CartOutcome
+from pbrl_bringup.cart.outcome import CartOutcome
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.files import write_json
 

@@ -18,8 +18,9 @@ import numpy as np
 from bullet_sim.settings import parse_settings
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.cart.navigator import PROVED, PlannerCall
+from pbrl_bringup.cart.outcome import CartOutcome
 from pbrl_bringup.cart.outline import POSTURE
-from pbrl_bringup.cart_run import CartOutcome, run_cart
+from pbrl_bringup.cart_run import run_cart
 from pbrl_bringup.experiments.cart_kept import keep_leg, read_leg
 from pbrl_bringup.experiments.cart_office_figure import draw
 from pbrl_bringup.parallel import in_parallel

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Polygon
 
-from pbrl_bringup.cart_run import CartOutcome, Trace
+from pbrl_bringup.cart.outcome import CartOutcome, Trace
 from pbrl_bringup.experiments.figures import canvas, save
 from pbrl_control.cart import DriveStatus
 from pbrl_control.planar import rotation
