@@ -41,7 +41,8 @@ FAR = 0.5
 """Of the greatest distance between two goals of an office, which the next goal is away at least."""
 MANNERS = {"social": True, "step_in_rate": 1.0}
 """People stop before robot and cart; now and then somebody steps in front of them."""
-PEOPLE = 5
+PEOPLE = 3
+"""Who walk to and fro. They go straight on: in a corridor where none can pass beside the cart each stops all others."""
 FIRST_PLAN, SHARE_OPTIMAL = 0.05, 0.95
 POSITION, ANGLE = 0.03, math.radians(2.0)
 THESIS = {"calls": 134.0, "failures": 25.0, "expansions": 15157.87, "seconds": 1.23, "epsilon": 1.30}
