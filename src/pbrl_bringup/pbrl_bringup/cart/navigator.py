@@ -17,7 +17,7 @@ from pbrl_planner.errors import PlannerError
 from pbrl_planner.lattice import CostGrid, Lattice, LatticePlan, LatticeProblem, LatticeSettings, Motions, plan
 from pbrl_planner.lattice.primitives import TURN
 
-PATIENCE = LatticeSettings(epsilon=3.0, last_epsilon=1.0, time_limit=60.0, expansions=3_000_000)
+PATIENCE = LatticeSettings(epsilon=3.0, last_epsilon=1.0, time_limit=120.0, expansions=5_000_000)
 """As in thesis 4.5.4: epsilon from 3 to 1, for at most as many expansions as take about ten seconds. Told so, the
 same drive is planned alike however busy the machine is. It is searched from the goal, and, where that finds nothing,
 again from the start: that people have shut the robot in is soonest proved from there."""
