@@ -144,6 +144,36 @@ def test_a_way_is_found_where_there_is_one_and_else_that_is_said(
     assert run.planning >= run.longest > 0.0
 
 
+def hall(width: float) -> NamoScene:
+    """A hall of 6 m, narrower in its middle, with a table there."""
+    walls = {"low": box(1.0, 0.3, 3.0, 0.15), "high": box(1.0, 0.3, 3.0, width - 0.15)}
+    movable = {"table": Movable(box(0.8, 0.8), 0.75, 33.0)}
+    poses = {"table": np.array([3.0, width / 2.0, 0.0])}
+    start, end = np.array([0.9, width / 2.0, 0.0]), np.array([5.2, width / 2.0, math.nan])
+    return NamoScene.of(box(6.0, width, 3.0, width / 2.0), walls, movable, poses, start, end)
+
+
+def test_what_only_turns_where_it_fills_a_passage_is_proved_to_close_it_and_what_rolls_is_not() -> None:
+    scene = hall(1.9)
+    assert out_of_reach(scene, truth_of(scene, table=("front_left",)))
+    assert not out_of_reach(scene, truth_of(scene))
+    wide = hall(4.0)
+    assert not out_of_reach(wide, truth_of(wide, table=("front_left",)))
+
+
+def test_what_cannot_be_grasped_from_where_the_robot_is_proves_that_a_goal_is_out_of_reach() -> None:
+    scene = hall(1.9)
+    low = NamoScene.of(
+        np.asarray(scene.room.exterior.coords)[:-1],
+        {name: np.asarray(outline.exterior.coords)[:-1] for name, outline in scene.fixed.items()},
+        {"table": Movable(box(0.8, 0.8), 0.3, 33.0)},
+        dict(scene.poses),
+        scene.start,
+        scene.goal,
+    )
+    assert out_of_reach(low, truth_of(low)), "no gripper gets down to it"
+
+
 def test_a_start_in_something_is_no_success() -> None:
     scene = room().moved({}, np.array([3.0, 2.8, 0.0]))
     assert find_way(scene, truth_of(scene), 0).end == LOST

@@ -33,13 +33,17 @@ ROOT = Path(__file__).resolve().parents[2]
 POSES = {SQUARE: (2.6, 1.5, 0.0), LONG: (2.6, -0.7, 0.1)}
 
 
-def moment(time: float, state: State, sentence: str = "on its way") -> Moment:
-    return Moment(time, str(state), sentence, (0.1 * time, 0.0, 0.3), POSES, SQUARE)
+def moment(time: float, state: State, sentence: str = "on its way", moved: str | None = None) -> Moment:
+    poses = POSES if moved is None else {**POSES, moved: (3.4, 0.2, 0.5)}
+    return Moment(time, str(state), sentence, (0.1 * time, 0.0, 0.3), poses, SQUARE)
 
 
-def outcome(reached: bool = True, updates: float = 1.0, surprises: float = 1.0, planned: float = 1.2) -> NamoOutcome:
+def outcome(
+    reached: bool = True, updates: float = 1.0, surprises: float = 1.0, planned: float = 1.2, moved: str = LONG
+) -> NamoOutcome:
     state = State.DONE if reached else State.FAILED
-    moments = tuple(moment(5.0 * k, each) for k, each in enumerate((State.PLANNING, State.CLEAR, state)))
+    moments = tuple(moment(5.0 * k, each) for k, each in enumerate((State.PLANNING, State.CLEAR)))
+    moments += (moment(10.0, state, moved=moved),)
     rows = {PLANS: 3.0, UPDATES: updates, SURPRISES: surprises, PLANNED: planned}
     sentence = "at the goal" if reached else "no way from region 0"
     outlines = {name: tuple(map(tuple, outline_of(name).tolist())) for name in SIZES}
@@ -106,6 +110,13 @@ def test_rows_hold_where_all_reach_the_goal_and_not_where_too_few_do() -> None:
     assert not bad[0].holds
     enough = rows_of([outcome() for _ in range(38)] + [outcome(reached=False)] * 2, namo_static.THESIS)
     assert enough[0].holds
+
+
+def test_a_run_that_moves_the_table_that_was_to_be_stuck_is_not_as_told() -> None:
+    runs = [outcome(), outcome(moved=SQUARE, updates=0.0, surprises=0.0), outcome(reached=False)]
+    told = rows_of(runs, namo_static.THESIS)[-1]
+    assert told.value == 1
+    assert not told.holds
 
 
 def test_a_run_that_thinks_too_long_or_learns_unasked_is_seen() -> None:

@@ -146,7 +146,8 @@ def behind_a_door(cabinet: tuple[float, float, float]) -> NamoScene:
 
 def test_what_takes_the_room_to_stand_is_told_before_a_goal_is_given_up() -> None:
     closed = behind_a_door((4.7, 2.5, 0.0))
-    found = plan(closed, beliefs_of(closed), 0, QUICK)
+    once = NamoSettings(manipulation=QUICK.manipulation.model_copy(update={"steps": 1}))
+    found = plan(closed, beliefs_of(closed), 0, once)
     assert found.goal in found.cut_off
     assert {room.blockers for room in found.rooms} == {("cabinet",)}
     assert "'cabinet' first" in found.reason
@@ -157,6 +158,35 @@ def test_what_takes_the_room_to_stand_is_told_before_a_goal_is_given_up() -> Non
     after = plan(free, beliefs_of(free), 0, QUICK)
     assert after.rooms == ()
     assert after.goal not in after.cut_off
+
+
+def test_what_takes_the_room_to_stand_is_put_aside_and_the_goal_reached() -> None:
+    scene, order = behind_a_door((4.7, 2.5, 0.0)), list[str]()
+    been: dict[str, list[np.ndarray]] = {}
+    for turn in range(6):
+        found = plan(scene, beliefs_of(scene), turn, QUICK, been)
+        if found.drive:
+            break
+        assert found.chosen is not None and found.chosen.plan is not None, found.reason
+        made = found.chosen.plan
+        assert made.aside == (made.object == "cabinet")
+        assert made.more > 0 or not made.aside, "what is put aside opens nothing"
+        assert found.rooms == () and found.reason == ""
+        assert not any(np.hypot(*(made.end - pose)[:2]) < 0.05 for pose in been.get(made.object, ()))
+        been.setdefault(made.object, []).append(np.array(scene.poses[made.object]))
+        leave = compose(inverse(scene.poses[made.object]), made.drive_to)
+        scene = scene.moved({made.object: made.end}, compose(made.end, leave))
+        order.append(made.object)
+    assert order[0] == "cabinet" and order[-1] == "table"
+    assert found.drive
+
+
+def test_what_cannot_be_moved_is_not_put_aside() -> None:
+    scene = behind_a_door((4.7, 2.5, 0.0))
+    for still in ("cabinet", "table"):
+        found = plan(scene, beliefs_of(scene, **{still: stuck(scene.movable[still])}), 0, QUICK)
+        assert found.chosen is None
+        assert found.reason
 
 
 @pytest.mark.parametrize("number", [0, 1, 6, 36])

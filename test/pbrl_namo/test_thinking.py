@@ -17,11 +17,13 @@ import pytest
 from pbrl_bag.errors import BagError
 from pbrl_bag.types import Recording
 from pbrl_control.constraints.classes import ModelClass
+from pbrl_mismatch.encounter import Encounter
 from pbrl_mismatch.errors import MismatchError
 from pbrl_model.fitting.options import FitOptions
 from pbrl_model.parameters import KERNEL_COLUMNS, BodyParameters
 from pbrl_namo import thinking
 from pbrl_namo.beliefs.belief import ObjectBelief, belief_of_draws
+from pbrl_namo.beliefs.stops import Stop
 from pbrl_namo.errors import NamoError
 from pbrl_namo.executive import Move, PlanJob, Refused
 from pbrl_namo.executive.jobs import GraspAnswer, GraspJob, LearnAnswer, LearnJob, MismatchAnswer, MismatchJob, finite
@@ -207,6 +209,37 @@ def test_errors_of_learning_and_diagnosis_are_refusals_of_one_line(kind: type[Le
     assert isinstance(unknown, Refused)
     assert "nobody" in unknown.reason
     assert "\n" not in unknown.reason
+
+
+def test_learning_does_not_need_to_know_what_was_met(monkeypatch: pytest.MonkeyPatch, pinned: Recording) -> None:
+    def hardly_moved(recording: Recording, name: str) -> None:
+        raise MismatchError(f"{name}: expected it to have moved")
+
+    monkeypatch.setattr(thinking, "find_encounter", hardly_moved)
+    answer = thoughts(lambda begin, end: pinned)(LearnJob("table", 2.0, 6.0, None, 3))
+    assert isinstance(answer, LearnAnswer)
+    assert answer.explained
+
+
+def test_what_was_met_is_not_gone_to_again_and_what_was_met_before_neither(
+    monkeypatch: pytest.MonkeyPatch, pinned: Recording
+) -> None:
+    here, ahead = np.array([2.0, 1.0, 0.0]), np.array([1.0, 0.0])
+    met = Encounter(5.0, here, np.array([2.02, 1.0, 0.0]), np.array([0.4, 0.0]), -ahead, 60.0, 5.0)
+    monkeypatch.setattr(thinking, "find_encounter", lambda recording, name: met)
+    think = thoughts(lambda begin, end: pinned)
+    learned = think(LearnJob("table", 2.0, 6.0, None, 3))
+    assert isinstance(learned, LearnAnswer)
+    assert not learned.explained
+    assert "met something near (2.42, 1.00) m" in learned.reason
+    earlier = Stop(np.zeros(2), np.array([0.0, 1.0]), 4.0)
+    answer = think(MismatchJob("table", 2.0, 6.0, replace(learned.belief, stops=(earlier,)), 3))
+    assert isinstance(answer, MismatchAnswer)
+    assert answer.belief is not None
+    first, second = answer.belief.stops
+    assert first is earlier
+    np.testing.assert_allclose(second.direction, ahead)
+    assert second.level == pytest.approx(2.4 - thinking.SPARE)
 
 
 def diagnosed(monkeypatch: pytest.MonkeyPatch, effects: tuple[str, ...], mass: float = 21.0) -> None:

@@ -15,6 +15,7 @@ from pbrl_bringup.paths import node_executable, workspace
 NODES = [
     ("krang_sim", "sim_node"),
     ("krang_sim", "hand_node"),
+    ("pr2_cart_sim", "sim_node"),
     ("pbrl_bag", "recorder_node"),
     ("pbrl_bag", "player_node"),
     ("pbrl_control", "body_controller_node"),

@@ -30,6 +30,7 @@ from pbrl_namo.executive.table import ENDED, State
 from pbrl_namo.executive.thinker import ImmediateThinker
 from pbrl_namo.planner import NamoSettings
 from pbrl_namo.thinking import Thoughts
+from pbrl_namo.warming import compile_kernels
 
 Array = NDArray[np.float64]
 
@@ -185,6 +186,7 @@ def run_namo(
         planning: settings of the planner.
         longest: simulated time after which it is given up [s].
     """
+    compile_kernels()
     with KrangSession(scene, seed=seed) as session:
         run = NamoRun(session, goal, seed, executive, planning)
         while session.time < longest and run.executive.state not in ENDED:

@@ -3,6 +3,7 @@
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
 from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis, diagnose, track_of
 from pbrl_mismatch.effects.registry import EFFECTS
+from pbrl_mismatch.encounter import Encounter, find_encounter
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.options import DiagnoseOptions
 
@@ -10,10 +11,12 @@ __all__ = [
     "EFFECTS",
     "DiagnoseOptions",
     "Diagnosis",
+    "Encounter",
     "MismatchError",
     "ObjectDiagnosis",
     "ResidualWrench",
     "diagnose",
+    "find_encounter",
     "residual_wrench",
     "track_of",
 ]

@@ -23,15 +23,17 @@ from pbrl_namo.beliefs.belief import ObjectBelief, prior_belief
 from pbrl_namo.beliefs.settings import BeliefSettings
 from pbrl_namo.errors import NamoError
 from pbrl_namo.manipulation.cost import best_reward
-from pbrl_namo.manipulation.estimate import Study, estimate_prepared
+from pbrl_namo.manipulation.estimate import estimate_prepared
+from pbrl_namo.manipulation.making_room import RoomMaker
 from pbrl_namo.manipulation.plan import Estimate
 from pbrl_namo.manipulation.settings import ManipulationSettings
+from pbrl_namo.manipulation.study import Study
 from pbrl_namo.manipulation.yard import Yard
 from pbrl_namo.mdp.expansion import expand
 from pbrl_namo.mdp.settings import MdpSettings
 from pbrl_namo.mdp.value_iteration import Policy
 from pbrl_namo.regions.free_space import FreeSpace, drive_radius, free_space
-from pbrl_namo.regions.openings import Opening, cut_off, openings
+from pbrl_namo.regions.openings import Opening, closers, cut_off, openings
 from pbrl_namo.regions.roadmap import Roadmap, build_roadmap
 from pbrl_namo.regions.settings import RegionSettings
 from pbrl_namo.regions.standing_room import StandingRoom, standing_room
@@ -112,7 +114,11 @@ def prior_beliefs(scene: NamoScene, seed: int, settings: NamoSettings | None = N
 
 
 def plan(
-    scene: NamoScene, beliefs: Mapping[str, ObjectBelief], seed: int, settings: NamoSettings | None = None
+    scene: NamoScene,
+    beliefs: Mapping[str, ObjectBelief],
+    seed: int,
+    settings: NamoSettings | None = None,
+    been: Mapping[str, Sequence[Array]] | None = None,
 ) -> NamoPlan:
     """Plan what to move next; same seed, same plan.
 
@@ -121,6 +127,8 @@ def plan(
         beliefs: of everything movable that may have to be moved.
         seed: of the roadmap and the sampled worlds.
         settings: of everything.
+        been: poses (3,) in `world`, by name, from which things were moved on the way to this goal: where a thing is
+            moved in steps, or out of the way, it is not brought back there, so that this comes to an end [m, rad].
 
     Raises:
         NamoError: nothing is believed of a thing that could be moved, or a belief is not of it.
@@ -140,7 +148,12 @@ def plan(
     roadmap = clock("roadmap", lambda: build_roadmap(scene, np.random.default_rng([seed, 0]), settings.regions))
     found = clock("openings", lambda: _left(scene, free, openings(scene, free, roadmap)))
     away = cut_off(free, found, start)
+    maker = _Maker(scene, free, roadmap, beliefs, seed, settings.manipulation, clock, been or {})
     if goal in away:
+        made_room = maker.make_room(start, goal)
+        if made_room is not None:
+            none = (None,) * len(found)
+            return NamoPlan(free, start, goal, found, none, None, made_room, "", False, away, (), clock.seconds)
         draws = np.random.default_rng([seed, 3])
         rooms = clock(
             "standing room", lambda: standing_room(scene, free, roadmap, found, start, draws, settings.regions)
@@ -148,11 +161,12 @@ def plan(
         why = _unreachable(free, start, goal, away, rooms)
         none = (None,) * len(found)
         return NamoPlan(free, start, goal, found, none, None, None, why, False, away, rooms, clock.seconds)
-    maker = _Maker(scene, free, roadmap, beliefs, seed, settings.manipulation, clock)
     best = best_reward(settings.manipulation.cost)
     made = clock.around("values", lambda: expand(len(free.regions), start, goal, found, maker, best, settings.mdp))
     action = made.policy.best[start]
     chosen = None if action is None else made.estimates[action]
+    if chosen is None:
+        chosen = maker.make_room(start, goal)
     reason = "" if chosen is not None else _hopeless(start, goal, made.estimates)
     return NamoPlan(
         free, start, goal, found, made.estimates, made.policy, chosen, reason, False, away, (), clock.seconds
@@ -200,7 +214,9 @@ class _Maker:
         seed: int,
         settings: ManipulationSettings,
         clock: _Clock,
+        been: Mapping[str, Sequence[Array]],
     ) -> None:
+        self._been = been
         self._scene, self._free, self._roadmap, self._beliefs = scene, free, roadmap, beliefs
         self._seed, self._settings, self._clock = seed, settings, clock
         self._names = list(scene.movable)
@@ -209,16 +225,45 @@ class _Maker:
 
     def __call__(self, opening: Opening) -> Estimate:
         """Return the estimate of an opening."""
-        if self._yard is None:
-            self._yard = self._clock("scene", self._prepare)
-        yard = self._yard
+        yard = self.yard
         for name in (opening.object, *opening.then):
-            if name not in self._studies:
-                self._studies[name] = self._clock("worlds", partial(self._study, name))
+            self.study(name)
         return self._clock(
             "manipulation",
-            lambda: estimate_prepared(yard, self._free, self._roadmap, opening, self._studies, self._settings),
+            lambda: estimate_prepared(
+                yard,
+                self._free,
+                self._roadmap,
+                opening,
+                self._studies,
+                self._settings,
+                self._been.get(opening.object, ()),
+            ),
         )
+
+    @property
+    def yard(self) -> Yard:
+        """The scene, prepared."""
+        if self._yard is None:
+            self._yard = self._clock("scene", self._prepare)
+        return self._yard
+
+    def study(self, name: str) -> Study:
+        """Return a thing, made ready."""
+        if name not in self._studies:
+            self._studies[name] = self._clock("worlds", partial(self._study, name))
+        return self._studies[name]
+
+    def make_room(self, start: int, goal: int) -> Estimate | None:
+        """Return what to expect of moving something so that what closes the goal can be moved, if anything."""
+        if self._settings.steps < 2:
+            return None
+        return self._clock.around("room", lambda: self._make_room(start, goal))
+
+    def _make_room(self, start: int, goal: int) -> Estimate | None:
+        found = closers(self._scene, self._free, start, goal)
+        rooms = RoomMaker(self.yard, self._free, self._roadmap, self.study, self._settings, self._been)
+        return rooms.find(found, self._scene.goal[:2])
 
     def _prepare(self) -> Yard:
         return Yard.of(self._scene, self._free.radius, self._settings.cell)

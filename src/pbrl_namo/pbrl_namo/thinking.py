@@ -18,14 +18,17 @@ from pbrl_bag.types import Recording
 from pbrl_control.constraints.object_model import SwivelCasters
 from pbrl_control.planar import Array
 from pbrl_mismatch.diagnose import diagnose
+from pbrl_mismatch.encounter import Encounter, find_encounter
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.kernels.columns import COLUMN
+from pbrl_mismatch.online.slices import BEFORE, between
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_model.errors import ModelError
 from pbrl_model.fitting.fit import fit_recording
 from pbrl_model.fitting.options import FitOptions
 from pbrl_model.parameters import KERNEL_COLUMNS
 from pbrl_namo.beliefs.belief import ObjectBelief, belief_of_draws, prior_belief
+from pbrl_namo.beliefs.stops import Stop
 from pbrl_namo.errors import NamoError
 from pbrl_namo.executive.jobs import (
     Answer,
@@ -57,6 +60,8 @@ WIDER = (0.0, 0.06, 0.06)
 SWIVEL, INSET = 0.07, 0.06
 """Of casters that swing round, as most furniture has: resistance over their load while they stand across the motion
 (bearing and scrub over the trail of an office caster), and how far from the corners they are [m]."""
+SPARE = 0.03
+"""By so much a thing keeps away from where a force set in on its way [m]."""
 SPACING = 0.5
 """Between points of a region that is to be opened [m]."""
 
@@ -102,11 +107,11 @@ class Thoughts:
         begun = time.perf_counter()
         beliefs, way = _beliefs(job, self._settings), None
         settings = self._settings
-        first = found = plan(job.scene, beliefs, job.seed, settings)
+        first = found = plan(job.scene, beliefs, job.seed, settings, job.been)
         for wider in WIDER:
             if wider > 0.0:
                 settings = _wider(job.scene, settings, wider)
-                found = plan(job.scene, beliefs, job.seed, settings)
+                found = plan(job.scene, beliefs, job.seed, settings, job.been)
             if not found.drive:
                 break
             # A disc that gets through says nothing of the turns that a longer robot has to make on its way.
@@ -118,7 +123,7 @@ class Thoughts:
         chosen, move = None if way is not None else found.chosen, None
         if chosen is not None and chosen.plan is not None:
             opening = chosen.opening
-            targets = _targets(found, chosen.plan, opening.end)
+            targets = np.zeros((0, 2)) if chosen.plan.aside else _targets(found, chosen.plan, opening.end)
             move = _move(chosen.plan, opening.start, opening.end, targets, opening.then)
         return PlanAnswer(
             move,
@@ -142,7 +147,10 @@ class Thoughts:
             belief = belief_of_draws(_movable(recording, job.object), posterior.names, posterior.flat)
         except (BagError, ModelError, NamoError) as error:
             return Refused(_line(error))
+        met = _met(recording, job.object)
         unexplained = [note for note in found.notes if note.startswith(UNEXPLAINED)]
+        unexplained += [] if met is None else [f"it {met.told()}"]
+        belief = replace(belief, stops=_stops(job))
         return LearnAnswer(belief, not unexplained, "; ".join(unexplained), time.perf_counter() - begun)
 
     def diagnose(self, job: MismatchJob) -> Answer:
@@ -150,6 +158,10 @@ class Thoughts:
         begun = time.perf_counter()
         try:
             recording = self._recorded(job.begin, job.end)
+            met = _met(recording, job.object)
+            if met is not None:
+                belief = self._before(recording, job, met.time)
+                return MismatchAnswer(_stopped(belief, job, met), f"it {met.told()}", time.perf_counter() - begun)
             options = self._diagnosis.model_copy(update={"objects": (job.object,), "seed": job.seed})
             found = diagnose(recording, options).objects[job.object]
             names = " and ".join(each.effect for each in found.effects)
@@ -159,10 +171,42 @@ class Thoughts:
             row = found.repaired.row
             known = [name for name in KERNEL_COLUMNS if name in COLUMN and np.isfinite(row[COLUMN[name]])]
             draws = np.array([[row[COLUMN[name]] for name in known]])
-            belief = belief_of_draws(_movable(recording, job.object), known, draws)
+            belief = replace(belief_of_draws(_movable(recording, job.object), known, draws), stops=_stops(job))
         except (BagError, ModelError, MismatchError, NamoError) as error:
             return Refused(_line(error))
         return MismatchAnswer(belief, names, time.perf_counter() - begun)
+
+    def _before(self, recording: Recording, job: MismatchJob, until: float) -> ObjectBelief:
+        """Return what an object is like by what was felt before it met something; without that, as any is."""
+        movable = _movable(recording, job.object)
+        try:
+            free = between(recording, job.begin - BEFORE, until)
+            options = self._fit.model_copy(update={"objects": (job.object,), "seed": job.seed})
+            posterior = fit_recording(free, options).objects[job.object].posterior
+            drawn = posterior.thinned(KEPT_DRAWS, np.random.default_rng(job.seed)).canonical()
+            return belief_of_draws(movable, drawn.names, drawn.flat)
+        except (BagError, ModelError, NamoError):  # it moved too little until then
+            return unlearned(movable, self._settings)
+
+
+def _met(recording: Recording, name: str) -> Encounter | None:
+    """Return what an object met on its way; None as well where that cannot be asked, because it hardly moved."""
+    try:
+        return find_encounter(recording, name)
+    except (BagError, ModelError, MismatchError):
+        return None
+
+
+def _stops(job: LearnJob) -> tuple[Stop, ...]:
+    """Return what an object has met before."""
+    return job.belief.stops if isinstance(job.belief, ObjectBelief) else ()
+
+
+def _stopped(belief: ObjectBelief, job: LearnJob, met: Encounter) -> ObjectBelief:
+    """Return a belief of an object that does not go again where it met something."""
+    stop = Stop(met.point, -met.direction, 0.0)
+    level = float(stop.beyond(met.begun)) - SPARE
+    return replace(belief, stops=(*_stops(job), replace(stop, level=level)))
 
 
 UNEXPLAINED = ("something that this model class does not have", "no parameters that the prior allows explain")
@@ -186,14 +230,13 @@ def _reason(first: NamoPlan, last: NamoPlan) -> str:
 
 def _beliefs(job: PlanJob, settings: NamoSettings) -> dict[str, ObjectBelief]:
     """Return what is believed of everything movable: learned, or what such furniture is like."""
-    found = {}
-    for name, thing in job.scene.movable.items():
-        learned = job.beliefs.get(name)
-        if isinstance(learned, ObjectBelief):
-            found[name] = learned
-        else:
-            found[name] = prior_belief(thing, np.random.default_rng(0), settings.beliefs)
-    return found
+    learned = {name: belief for name, belief in job.beliefs.items() if isinstance(belief, ObjectBelief)}
+    return {name: learned.get(name) or unlearned(thing, settings) for name, thing in job.scene.movable.items()}
+
+
+def unlearned(thing: Movable, settings: NamoSettings) -> ObjectBelief:
+    """Return what is believed of a thing before it was moved; the same each time."""
+    return prior_belief(thing, np.random.default_rng(0), settings.beliefs)
 
 
 def _move(found: ManipulationPlan, start: int, end: int, targets: Array, then: tuple[str, ...]) -> Move:
@@ -210,6 +253,7 @@ def _move(found: ManipulationPlan, start: int, end: int, targets: Array, then: t
         replace(found.model, casters=_casters(np.asarray(found.model.footprint))),
         str(found.model_class),
         hands=found.sides,
+        more=found.more,
     )
 
 

@@ -158,6 +158,22 @@ def test_a_turn_that_a_gap_has_just_room_for_is_made() -> None:
     )
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_noisy_poses_do_not_stop_it_in_a_gap_as_wide_as_itself(seed: int) -> None:
+    """A gap with 3 mm to spare on either side, poses with 2 mm and 2 mrad of noise."""
+    rng = np.random.default_rng(seed)
+    width = float(np.abs(KRANG_STOWED.outline[:, 1]).max()) + 0.003
+    sides = {"left": box(0.8, width, 1.6, width + 0.8), "right": box(0.8, -width - 0.8, 1.6, -width)}
+    tracker = PathTracker(straight(2.4), LIMITS, checker=MotionChecker(FloorMap.of(ROOM, sides), KRANG_STOWED))
+    base = Unicycle(np.zeros(3))
+    for _ in range(4000):
+        command = tracker.step(base.time, base.pose + rng.normal(0.0, [0.002, 0.002, 0.002]))
+        base.move(command)
+        if command.status in (TrackStatus.ARRIVED, TrackStatus.FAILED):
+            break
+    assert command.status is TrackStatus.ARRIVED, command.reason
+
+
 def test_a_base_that_is_pushed_away_and_one_that_does_not_move_are_given_up() -> None:
     tracker, base = PathTracker(straight(), LIMITS), Unicycle(np.zeros(3))
     for _ in range(100):

@@ -16,10 +16,10 @@ from pbrl_control.trajectories.monitor import AbortMonitor
 from pbrl_control.trajectories.trajectory_plan import AbortLimits
 from pbrl_control.types import Hold, PlanarTwist
 from pbrl_namo.executive import ExecutiveSettings
-from pbrl_namo.executive.account import Account, Change, Tries
+from pbrl_namo.executive.account import FAILURES, Account, Change, Tries
 from pbrl_namo.executive.course import ClearingCourse, cause_of
 from pbrl_namo.executive.releasing import Release
-from pbrl_namo.executive.table import Event, State
+from pbrl_namo.executive.table import TABLE, Event, State
 
 HOLD = Hold("table_a", np.zeros(2))
 ONWARDS = CourseStep(PlanarTwist(0.1), "onwards")
@@ -215,3 +215,9 @@ def test_the_account_counts_what_figure_45_counts() -> None:
 def test_settings_of_a_second_attempt_are_refused() -> None:
     with pytest.raises(ValueError, match=r"fetch.attempts: expected 1"):
         ExecutiveSettings.model_validate({"fetch": {"attempts": 2}})
+
+
+def test_a_step_of_several_is_no_failed_try() -> None:
+    assert Event.STEPPED not in FAILURES
+    assert Event.MOVED in FAILURES
+    assert TABLE[State.CLEAR, Event.STEPPED] == TABLE[State.CLEAR, Event.MOVED] == State.RELEASE

@@ -126,6 +126,8 @@ def test_a_move_is_slowed_down_not_cut_short(kinematics: RobotKinematics) -> Non
     assert trajectory.end == pytest.approx([1.2, 0.0, 0.8], abs=1e-6)
     longer = plan_of(fast, candidate, ExecutiveSettings(stretch=1.5)).trajectory(np.zeros(3))
     assert longer.end == pytest.approx([1.2, 0.0, 1.2], abs=1e-6), "the last part goes on"
+    step = plan_of(replace(fast, more=1), candidate, ExecutiveSettings(stretch=1.5)).trajectory(np.zeros(3))
+    assert step.end == pytest.approx([1.2, 0.0, 0.8], abs=1e-6), "a step ends where the next one begins"
 
 
 def test_what_is_expected_without_a_model_counts(kinematics: RobotKinematics) -> None:

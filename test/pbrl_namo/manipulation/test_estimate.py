@@ -136,7 +136,7 @@ def test_the_robot_prefers_what_works_in_most_worlds() -> None:
 def test_where_no_policy_opens_a_way_an_arc_may_or_two_motions(radii: tuple[float, ...], motions: int) -> None:
     scene = doorway()
     beliefs = surely(scene)
-    one = estimated(scene, beliefs, "desk", QUICK.model_copy(update={"second_look": False}))
+    one = estimated(scene, beliefs, "desk", QUICK.model_copy(update={"second_look": False, "steps": 1}))
     two = estimated(scene, beliefs, "desk", QUICK.model_copy(update={"radii": radii}))
     assert one.probability == 0.0
     assert two.probability == 1.0
@@ -200,6 +200,7 @@ def test_what_cannot_be_grasped_opens_nothing() -> None:
     scene = two_tables()
     free, roadmap = free_space(scene), build_roadmap(scene, np.random.default_rng(0))
     none = type(roadmap)(**{**roadmap.__dict__, "grasps": dict.fromkeys(roadmap.grasps, ())})
-    found = estimate(scene, free, none, Opening(0, 1, "long"), surely(scene), np.random.default_rng(0), QUICK)
+    once = QUICK.model_copy(update={"steps": 1})
+    found = estimate(scene, free, none, Opening(0, 1, "long"), surely(scene), np.random.default_rng(0), once)
     assert found.probability == 0.0
     assert "no grasp" in found.reason

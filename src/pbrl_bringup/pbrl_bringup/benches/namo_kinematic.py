@@ -17,20 +17,17 @@ from typing import Any
 import numpy as np
 import shapely
 
-from pbrl_control.constraints.classes import Freedom, ModelClass
+from pbrl_bringup.benches.namo_oracle import out_of_reach
 from pbrl_control.constraints.object_model import ObjectModel
 from pbrl_control.constraints.twist import achievable_twist
 from pbrl_control.planar import Array, compose, inverse
 from pbrl_control.types import PlanarTwist
 from pbrl_model.parameters import BodyParameters
 from pbrl_namo.beliefs.belief import ObjectBelief
-from pbrl_namo.errors import NamoError
 from pbrl_namo.manipulation.plan import ManipulationPlan
 from pbrl_namo.manipulation.plane_kernel import moved
 from pbrl_namo.manipulation.settings import ManipulationSettings
 from pbrl_namo.planner import NamoPlan, NamoSettings, plan, prior_beliefs
-from pbrl_namo.regions.free_space import free_space
-from pbrl_namo.regions.whereabouts import region_of
 from pbrl_namo.scene import NamoScene
 from pbrl_namo.scenes import draw_hidden, random_office
 from pbrl_namo.scenes.hidden import CASTERS
@@ -102,18 +99,20 @@ def find_way(
         seed: of beliefs and plans.
         settings: of the planner.
     """
-    beliefs = prior_beliefs(scene, seed, settings)
+    first, beliefs = scene, prior_beliefs(scene, seed, settings)
     seconds: list[float] = []
+    been: dict[str, list[Array]] = {}
     moves = failed = 0
     unwilling: list[str] = []
     while moves < MOST * len(scene.movable):
         began = time.perf_counter()
-        made = plan(scene, beliefs, seed + moves, settings)
+        made = plan(scene, beliefs, seed + moves, settings, been)
         seconds.append(time.perf_counter() - began)
         if made.drive or made.chosen is None or made.chosen.plan is None:
-            end = _end(scene, made, truth)
+            end = _end(first, made, truth)
             return Run(end, made.reason, moves, failed, sum(seconds), max(seconds), tuple(unwilling))
         name = made.chosen.plan.object
+        been.setdefault(name, []).append(np.array(scene.poses[name]))
         scene, refused, hit = carry_out(scene, made.chosen.plan, truth[name])
         moves, failed = moves + 1, failed + (refused or hit)
         unwilling += [name] if refused else []
@@ -199,31 +198,8 @@ def certain(model: ObjectModel) -> ObjectBelief:
     return ObjectBelief(model.footprint, model.parameters.to_vector()[None])
 
 
-def out_of_reach(scene: NamoScene, truth: Mapping[str, ObjectModel]) -> bool:
-    """Say whether start and goal are apart even with everything taken away that can truly be moved."""
-    mobile = {name for name, model in truth.items() if not _static(model, scene.poses[name])}
-    free = free_space(scene, leave_out=mobile)
-    try:
-        bare = NamoScene(
-            scene.room,
-            scene.fixed,
-            {name: thing for name, thing in scene.movable.items() if name not in mobile},
-            {name: pose for name, pose in scene.poses.items() if name not in mobile},
-            scene.start,
-            scene.goal,
-            scene.robot,
-        )
-        return region_of(bare, free, scene.start) != region_of(bare, free, scene.goal, "goal")
-    except NamoError:
-        return True
-
-
-def _static(model: ObjectModel, pose: Array) -> bool:
-    return Freedom.of(model, pose).model_class == ModelClass.STATIC
-
-
 def _end(scene: NamoScene, made: NamoPlan, truth: Mapping[str, ObjectModel]) -> str:
-    """Say how a run ended whose last plan moves nothing."""
+    """Say how a run ended whose last plan moves nothing; out of reach it has to have been from the first scene on."""
     if made.drive:
         return REACHED
     if made.start is None:

@@ -1,7 +1,8 @@
 """Monte-Carlo manipulation and the kinodynamic RRT asked the same: open this, of known physics, in this room.
 
 Both know the truth. Both are asked for the first opening from where the robot is, whose thing can be moved at all; both
-have done it when the exact free space joins the robot's start and the same point beyond. The RRT may use three grasps,
+have done it when the exact free space joins the robot's start and the same point beyond. Ours may let go and take hold
+again, at most three times, planning anew each time; the RRT plans one manipulation. It may use three grasps,
 ours first where it has one, in equal parts of its time; of the base it is only asked that it is in nothing, not that
 it can drive as the thing goes.
 """
@@ -19,6 +20,7 @@ from pbrl_bringup.benches.namo_kinematic import carry_out, certain, true_models
 from pbrl_control.constraints.classes import Freedom, ModelClass
 from pbrl_control.constraints.object_model import ObjectModel
 from pbrl_control.planar import Array, compose, inverse
+from pbrl_namo.beliefs.belief import ObjectBelief
 from pbrl_namo.manipulation.estimate import estimate, target_point
 from pbrl_namo.manipulation.grasps import reachable_grasps
 from pbrl_namo.manipulation.plan import ManipulationPlan
@@ -33,6 +35,8 @@ from pbrl_planner.kinodynamic import Goal, KinodynamicSettings, PushProblem, Wre
 
 COUNT = 10
 """Movable things in a room."""
+STEPS = 4
+"""Manipulations at most that make one opening."""
 DRAWS = 100
 """Offices that are drawn until one has an opening."""
 GRASPS = 3
@@ -49,7 +53,7 @@ class Duel:
         object: to be moved.
         ours: whether Monte-Carlo manipulation opened it.
         our_seconds: that it took [s].
-        our_way: duration of the manipulation; NaN where there is none [s].
+        our_way: duration of the manipulations; NaN where there is none [s].
         theirs: whether the kinodynamic RRT did.
         their_seconds: likewise [s].
         their_way: likewise [s].
@@ -93,20 +97,54 @@ def _duel(
     scene: NamoScene, free: FreeSpace, roadmap: Roadmap, opening: Opening, truth: Mapping[str, ObjectModel], seed: int
 ) -> Duel:
     name = opening.object
-    opened = check_of(scene, free, name, target_point(scene, free, roadmap, opening))
+    target = target_point(scene, free, roadmap, opening)
+    opened = check_of(scene, free, name, target)
     rng = np.random.default_rng(seed)
     beliefs = {name: certain(truth[name])}
     estimate(scene, free, roadmap, opening, beliefs, np.random.default_rng(seed))  # loads what was compiled
     began = time.perf_counter()
     plan = estimate(scene, free, roadmap, opening, beliefs, rng).plan
     our_seconds = time.perf_counter() - began
-    ours = False
-    if plan is not None:
-        after, refused, hit = carry_out(scene, plan, truth[name])
-        ours = not refused and not hit and opened(after.poses[name])
+    ours, more_seconds, our_way = _carried_out(scene, target, plan, beliefs, truth[name], rng)
     way, their_seconds = _rrt(scene, roadmap, opening, truth[name], plan, opened, seed)
     theirs = way == way
-    return Duel(name, ours, our_seconds, plan.duration if plan else float("nan"), theirs, their_seconds, way)
+    return Duel(name, ours, our_seconds + more_seconds, our_way, theirs, their_seconds, way)
+
+
+def _carried_out(
+    scene: NamoScene,
+    target: Array,
+    plan: ManipulationPlan | None,
+    beliefs: Mapping[str, ObjectBelief],
+    model: ObjectModel,
+    rng: np.random.Generator,
+) -> tuple[bool, float, float]:
+    """Carry a plan out, and whatever is planned after it with the same thing.
+
+    Returns:
+        Whether the robot can then get to a point (2,), the time of the further plans and of all manipulations [s].
+    """
+    seconds, way, open_ = 0.0, 0.0, False
+    for _ in range(STEPS):
+        if plan is None:
+            break
+        name, way = plan.object, way + plan.duration
+        scene, refused, hit = carry_out(scene, plan, model)
+        free = free_space(scene)
+        here, there = free.index(scene.start), free.index(target)
+        open_ = not refused and not hit and here is not None and here == there
+        if open_ or refused or hit or plan.more == 0:
+            break
+        began = time.perf_counter()
+        roadmap = build_roadmap(scene, rng)
+        further = [
+            each
+            for each in openings(scene, free, roadmap)
+            if (each.object, each.start, each.end) == (name, here, there) and not each.then
+        ]
+        plan = estimate(scene, free, roadmap, further[0], beliefs, rng).plan if further else None
+        seconds += time.perf_counter() - began
+    return open_, seconds, way if way > 0.0 else float("nan")
 
 
 def check_of(scene: NamoScene, free: FreeSpace, name: str, target: Array) -> Callable[[Array], bool]:

@@ -18,6 +18,7 @@ EXPERIMENTS = {
     "limits": "what a diagnosis cannot tell, each limit measured on a recording that shows it",
     "namo-static": "section 6.5.1: a table is stuck, which is learned; the other one is moved",
     "namo-wheel": "section 6.5.2: a locked caster is learned, the table turned about it",
+    "namo-concealed": "a carpet, a tether or an unseen body in the way: who asks what was met, and who does not",
     "namo-scaling": "figures 34 and 35: time to plan among 5 to 80 movable obstacles",
     "cart-office": "section 4.6 and table 1: the PR2 pushes a cart through offices with people for an hour",
     "contact": "section 6.5.3: a wheel found on a table that is only pushed by another",

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-FIGURE = "figure.png"
+FIGURE = "figure"
 DPI = 130
 
 
@@ -25,9 +25,9 @@ def canvas(panels: int = 1, width: float = 9.0, height: float = 4.5) -> tuple[Fi
     return figure, axes
 
 
-def save(figure: Figure, out: Path) -> Path:
-    """Write the figure into a folder as `figure.png`; the same figure gives the same bytes."""
-    path = out / FIGURE
+def save(figure: Figure, out: Path, name: str = FIGURE) -> Path:
+    """Write the figure into a folder as a PNG file of a name; the same figure gives the same bytes."""
+    path = out / f"{name}.png"
     with matplotlib.rc_context({"savefig.dpi": DPI}):
         figure.savefig(path, metadata={"Software": None})
     return path

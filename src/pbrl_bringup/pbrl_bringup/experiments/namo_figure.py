@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from pbrl_bringup.experiments.figures import canvas, save
+from pbrl_bringup.experiments.figures import FIGURE, canvas, save
 from pbrl_bringup.namo_run import Moment, NamoOutcome
 from pbrl_control.navigation.footprint import KRANG_STOWED
-from pbrl_control.planar import rotation
+from pbrl_control.planar import Array, rotation
 
 COLOURS = ("#d98b3a", "#3a7bd9", "#5aa469", "#a05aa4")
 SHOWN = {
@@ -29,17 +30,27 @@ SHOWN = {
 MOST, COLUMNS = 12, 3
 
 
-def draw(run: NamoOutcome, out: Path) -> Path:
-    """Draw a run into a folder as `figure.png`."""
+def draw(run: NamoOutcome, out: Path, concealed: Sequence[Array] = (), name: str = FIGURE) -> Path:
+    """Draw a run into a folder as `figure.png`.
+
+    Args:
+        run: to be drawn.
+        out: the folder.
+        concealed: (k, 2) corners of what only the simulator knows [m].
+        name: of the file, without its ending.
+    """
     moments = [each for each in run.moments if each.state in SHOWN]
     if len(moments) > MOST:  # the beginning and the end say most
         moments = [*moments[: MOST // 2], *moments[-(MOST - MOST // 2) :]]
     rows = -(-len(moments) // COLUMNS)
     figure, _ = canvas(0, width=11.0, height=2.3 * rows)
     for k, moment in enumerate(moments):
-        _picture(figure.add_subplot(rows, COLUMNS, k + 1), moment, k + 1, run)
+        axes = figure.add_subplot(rows, COLUMNS, k + 1)
+        _picture(axes, moment, k + 1, run)
+        for shape in concealed:
+            axes.add_patch(Polygon(shape, closed=True, fc="none", ec="#c2185b", lw=1.2, ls="--"))
     _note(figure, run)
-    return save(figure, out)
+    return save(figure, out, name)
 
 
 def _picture(axes: Axes, moment: Moment, number: int, run: NamoOutcome) -> None:

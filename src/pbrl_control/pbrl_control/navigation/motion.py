@@ -24,7 +24,7 @@ class MotionChecker:
     Attributes:
         floor: the map.
         footprint: of the robot.
-        margin: [m].
+        margin: [m]; below zero: something that reaches less far into the robot's way is not in it.
     """
 
     floor: FloorMap
@@ -35,7 +35,7 @@ class MotionChecker:
     _passable: tuple[BaseGeometry, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        roomy = self.floor.free.buffer(-self.margin) if self.margin > 0.0 else self.floor.free
+        roomy = self.floor.free.buffer(-self.margin) if self.margin != 0.0 else self.floor.free
         turning = self.floor.free.buffer(-self.footprint.radius - self.margin)
         for name, area in (("_roomy", roomy), ("_turning", turning)):
             shapely.prepare(area)
@@ -43,9 +43,9 @@ class MotionChecker:
         passable = self.floor.free.buffer(-self.footprint.inner_radius - self.margin)
         object.__setattr__(self, "_passable", tuple(shapely.get_parts(passable)))
 
-    def bare(self) -> MotionChecker:
-        """Return the same without the margin."""
-        return MotionChecker(self.floor, self.footprint, 0.0)
+    def bare(self, slack: float = 0.0) -> MotionChecker:
+        """Return the same without the margin, or with what reaches into the robot's way by less than a slack [m]."""
+        return MotionChecker(self.floor, self.footprint, -slack)
 
     def pose_fault(self, pose: Array) -> str:
         """Return what the robot with `base` at the pose (3,) would be in; empty where it is free."""

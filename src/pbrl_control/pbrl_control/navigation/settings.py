@@ -16,6 +16,7 @@ class TrackerSettings(Section):
     yaw_tolerance: Positive = 0.0174  # [rad] at the goal
     off_path: Positive = 0.15  # [m] from the path at which it is given up
     look_ahead: NotNegative = 0.06  # [m, rad] past the stopping distance that has to be free
+    slack: NotNegative = 0.01  # [m] that something has to reach into the way to be in it: poses are noisy, gaps narrow
     patience: Positive = 5.0  # [s] of waiting for a lost pose or an obstacle to go away
     stall: Positive = 3.0  # [s] without motion though motion is commanded
     creeping: Positive = 0.005  # [m/s, rad/s] below which no motion is expected

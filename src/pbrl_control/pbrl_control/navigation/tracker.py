@@ -69,7 +69,7 @@ class PathTracker:
         self._path = path
         self._limits = limits
         self._settings = settings or TrackerSettings()
-        self._checker = checker.bare() if checker else None
+        self._checker = checker.bare(self._settings.slack) if checker else None
         self._leg = 0
         self._driving = False
         self._velocity = np.zeros(2)
@@ -80,7 +80,7 @@ class PathTracker:
 
     def update_map(self, checker: MotionChecker) -> None:
         """Take in what is known of the floor now."""
-        self._checker = checker.bare()
+        self._checker = checker.bare(self._settings.slack)
 
     def step(self, now: float, pose: Sequence[float] | Array | None) -> TrackCommand:
         """Return the velocities to drive with from now on.

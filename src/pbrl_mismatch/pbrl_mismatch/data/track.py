@@ -137,7 +137,7 @@ def lay_track(
         clock=np.concatenate([motion.time[:-1] for motion in motions]),
         begin=begin,
         last=begin + lengths - 1,
-        pivot=np.stack([_origin(seen[b], properties.com) for b in begin]),
+        pivot=np.stack([origin_of(seen[b], properties.com) for b in begin]),
         body=np.array([properties.inertia_per_mass, *properties.com, dt]),
         outline=np.ascontiguousarray(check_polygon(geometry.footprint)),
         feet=_feet(geometry),
@@ -154,7 +154,7 @@ def _feet(geometry: BodyGeometry) -> Array:
     return middle + half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
-def _origin(state: Array, com: Array) -> Array:
+def origin_of(state: Array, com: Array) -> Array:
     """Return the pose of the body's frame (3,) of a state of the centre of mass."""
     c, s = np.cos(state[2]), np.sin(state[2])
     return np.array([state[0] - c * com[0] + s * com[1], state[1] - s * com[0] - c * com[1], state[2]])

@@ -2,5 +2,6 @@
 
 from pbrl_namo.beliefs.belief import ObjectBelief, belief_of_draws, prior_belief
 from pbrl_namo.beliefs.settings import BeliefSettings
+from pbrl_namo.beliefs.stops import Stop
 
-__all__ = ["BeliefSettings", "ObjectBelief", "belief_of_draws", "prior_belief"]
+__all__ = ["BeliefSettings", "ObjectBelief", "Stop", "belief_of_draws", "prior_belief"]

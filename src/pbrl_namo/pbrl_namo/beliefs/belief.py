@@ -16,6 +16,7 @@ from pbrl_model.errors import ModelError
 from pbrl_model.parameters import KERNEL_COLUMNS, BodyParameters, expand
 from pbrl_namo.beliefs.furniture import furniture_rows
 from pbrl_namo.beliefs.settings import BeliefSettings
+from pbrl_namo.beliefs.stops import Stop
 from pbrl_namo.errors import NamoError
 from pbrl_namo.scene import Movable
 
@@ -30,6 +31,7 @@ class ObjectBelief:
     Attributes:
         footprint: (k, 2) outline in its own frame [m]; density is taken as uniform (thesis 5.3.1).
         rows: (n, 12) parameters in the order of `KERNEL_COLUMNS`, read-only.
+        stops: where it is not to go again, for something was met there.
 
     Raises:
         NamoError: the rows have another shape, there are none, or one is no body's.
@@ -37,6 +39,7 @@ class ObjectBelief:
 
     footprint: Array
     rows: Array
+    stops: tuple[Stop, ...] = ()
 
     def __post_init__(self) -> None:
         rows = np.array(self.rows, dtype=float)

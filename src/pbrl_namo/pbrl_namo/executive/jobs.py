@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,12 +29,13 @@ class Move:
         segments: twist (3,) of its origin in its axes [m/s, rad/s] and for how long [s], one after the other.
         contact: (2,) where to take hold, in its frame: the nearest point of its outline is meant [m].
         start, end: regions that the opening is to join, as numbered in the plan.
-        targets: (k, 2) points of the region to be opened, in `world` [m].
+        targets: (k, 2) points of the region to be opened, in `world`; none: no opening is looked for [m].
         then: further things that have to go before the robot can pass; the opening is complete but for them.
         expected_force: largest at any grip [N]; NaN: nobody knows.
         model: the physics that was planned with; None: nothing is known, and `expected_force` alone says what is much.
         model_class: in a word, for people.
         hands: that are to hold it; empty: any.
+        more: moves that are to follow before the opening is there; with some, moved as planned is as good as it gets.
     """
 
     object: str
@@ -48,6 +49,7 @@ class Move:
     model: ObjectModel | None = None
     model_class: str = ""
     hands: Hands = ()
+    more: int = 0
 
 
 @dataclass(frozen=True)
@@ -77,12 +79,14 @@ class PlanJob:
         beliefs: by object; those nothing was learned of are missing.
         tries: failed ones so far, by object.
         seed: of every draw.
+        been: poses (3,) by object from which it was moved on the way to this goal, in `world` [m, rad].
     """
 
     scene: NamoScene
     beliefs: Mapping[str, Belief]
     tries: Mapping[str, int]
     seed: int
+    been: Mapping[str, tuple[Array, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

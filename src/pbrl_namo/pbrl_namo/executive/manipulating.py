@@ -79,7 +79,8 @@ def plan_of(move: Move, candidate: GraspCandidate, settings: ExecutiveSettings) 
     limits = settings.motion
     segments = [_slowed(np.asarray(twist, dtype=float), duration, limits) for twist, duration in move.segments]
     last, time = segments[-1]
-    segments[-1] = (last, time * settings.stretch)
+    if move.more == 0:  # a step ends where the next one begins
+        segments[-1] = (last, time * settings.stretch)
     abort = settings.abort
     if move.model is None and math.isfinite(move.expected_force):
         most = max(abort.force_ratio * move.expected_force, abort.force_floor)
@@ -216,6 +217,8 @@ class Manipulation:
     def _clear(self, step: Step) -> Step:
         if self.course.end is not None:
             event, sentence = self.course.end
+            if event == Event.MOVED and self.move.more > 0:
+                return Step(f"moved as planned, {self.move.more} more to follow", Event.STEPPED)
             return Step(sentence, event)
         if self._fetch.phase == Phase.PUSH:
             return step

@@ -50,6 +50,7 @@ class Mission:
         planned: the last plan.
         grasp: the last grasp that was found.
         manipulation: the one under way, or the last.
+        been: poses (3,) by object from which it was to be moved [m, rad].
         vanished: things that are taken to stand where they were last seen.
         surprised: when something last happened to a manipulation, what has ended it for instance [s]; NaN: never.
 
@@ -68,6 +69,8 @@ class Mission:
         self.vanished: tuple[str, ...] = ()
         self._settings, self._seed = settings, seed
         self.surprised = math.nan
+        self.been: dict[str, tuple[Array, ...]] = {}
+        self._stood: dict[str, Array] = {}
         self._drawn = 0
 
     @property
@@ -87,7 +90,8 @@ class Mission:
     def plan_job(self, now: float, view: RoomView) -> PlanJob:
         """Return the job of planning for what is seen now; raises as of `RoomView.scene`."""
         scene = view.scene(now, self.goal, self.left_alone())
-        return PlanJob(scene, dict(self.beliefs), self.tries.counts, self._draw())
+        self._stood = {name: np.array(pose) for name, pose in scene.poses.items()}
+        return PlanJob(scene, dict(self.beliefs), self.tries.counts, self._draw(), dict(self.been))
 
     def grasp_job(self, now: float, view: RoomView) -> GraspJob:
         """Return the job of finding a grasp for the planned move; raises as of `RoomView.scene`."""
@@ -127,6 +131,11 @@ class Mission:
             if fault:
                 return Step(fault, Event.JOB_LOST)
             move = answer.move
+            if move.object in self._stood:
+                self.been[move.object] = (*self.been.get(move.object, ()), self._stood[move.object])
+            if move.more > 0:
+                later = f"{move.more} more to open the way from region {move.start} to {move.end}"
+                return Step(f"{move.object} is moved first, {later}", Event.PLANNED)
             return Step(f"{move.object} is to open the way from region {move.start} to {move.end}", Event.PLANNED)
         if answer.way is not None:
             return Step(f"nothing is in the way, {answer.way.length:.1f} m to drive", Event.NOTHING_TO_DO)
@@ -197,7 +206,17 @@ class Mission:
     def _draw(self) -> int:
         """Return the seed of the next job, above zero: the same ones in the same order for the same seed."""
         self._drawn += 1
-        return int(np.random.SeedSequence([self._seed, self._drawn]).generate_state(1)[0] % (2**31 - 1)) + 1
+        return job_seed(self._seed, self._drawn)
+
+
+def job_seed(seed: int, number: int) -> int:
+    """Return the seed of a mission's job, above zero.
+
+    Args:
+        seed: of the mission.
+        number: of the job, from 1 on; the first one is a plan.
+    """
+    return int(np.random.SeedSequence([seed, number]).generate_state(1)[0] % (2**31 - 1)) + 1
 
 
 def checked_goal(goal: Array) -> Array:

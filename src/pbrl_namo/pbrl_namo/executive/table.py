@@ -54,6 +54,7 @@ class Event(StrEnum):
     MISSED = "missed"
     OPENED = "opening found"
     MOVED = "moved, no opening"
+    STEPPED = "moved, one step of several"
     UNEXPECTED_FORCE = "unexpected force"
     STALLED = "stalled"
     TIMED_OUT = "timed out"
@@ -101,6 +102,7 @@ TABLE: Mapping[tuple[State, Event], State] = {
     (State.GRASP, Event.UNEXPECTED_FORCE): State.UPDATE_MODEL,
     (State.CLEAR, Event.OPENED): State.RELEASE,
     (State.CLEAR, Event.MOVED): State.RELEASE,
+    (State.CLEAR, Event.STEPPED): State.RELEASE,
     (State.CLEAR, Event.UNEXPECTED_FORCE): State.UPDATE_MODEL,
     (State.CLEAR, Event.STALLED): State.UPDATE_MODEL,
     (State.CLEAR, Event.TIMED_OUT): State.UPDATE_MODEL,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pbrl_control.planar import Array
 from pbrl_model.geometry import convex_parts
+from pbrl_namo.beliefs.stops import Stop
 from pbrl_namo.errors import NamoError
 
 Indices = NDArray[np.int64]
@@ -27,6 +28,7 @@ class Body:
         doors: (q, 2) a point that each part shares with its parent; its hub where it has none.
         parents: (q,) the part, of a lower number, that each hangs on; -1 of the first.
         circle: (3,) middle and radius of a circle around all of it.
+        stops: lines that points of it do not cross.
     """
 
     points: Array
@@ -35,9 +37,10 @@ class Body:
     doors: Array
     parents: Indices
     circle: Array
+    stops: tuple[Stop, ...] = ()
 
     @classmethod
-    def of(cls, footprint: Array) -> Self:
+    def of(cls, footprint: Array, stops: tuple[Stop, ...] = ()) -> Self:
         """Cut an outline (k, 2) into convex parts.
 
         Raises:
@@ -50,7 +53,7 @@ class Body:
         doors[0] = hubs[0]
         starts = np.concatenate(([0], np.cumsum([len(part) for part in parts]))).astype(np.int64)
         points = np.ascontiguousarray(np.vstack(parts), dtype=float)
-        return cls(points, starts, hubs, doors, parents, circle_around(points))
+        return cls(points, starts, hubs, doors, parents, circle_around(points), stops)
 
 
 def circle_around(points: Array) -> Array:

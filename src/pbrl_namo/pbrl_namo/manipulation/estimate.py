@@ -10,28 +10,26 @@ each command is followed once with each grasp; what it takes of the grips is the
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from pbrl_control.constraints.classes import ModelClass
-from pbrl_control.planar import Array, compose
+from pbrl_control.planar import Array
 from pbrl_namo.beliefs.belief import ObjectBelief
-from pbrl_namo.errors import NamoError
-from pbrl_namo.manipulation.body import Body
+from pbrl_namo.manipulation.best_plan import best_plan
 from pbrl_namo.manipulation.cost import reward
-from pbrl_namo.manipulation.effort_kernel import FORCE, PEAK, SUM, TIME, TORQUE
+from pbrl_namo.manipulation.effort_kernel import FORCE, SUM, TIME, TORQUE
 from pbrl_namo.manipulation.grasps import reachable_grasps
-from pbrl_namo.manipulation.plan import Estimate, ManipulationPlan, Motion
-from pbrl_namo.manipulation.plane_kernel import moved
-from pbrl_namo.manipulation.policies import TURNS, Commands, centre_of
+from pbrl_namo.manipulation.in_steps import estimate_in_steps
+from pbrl_namo.manipulation.plan import Estimate
 from pbrl_namo.manipulation.rollout import Roller
 from pbrl_namo.manipulation.settings import ManipulationSettings
-from pbrl_namo.manipulation.ways_to_move import WaysToMove, first_look, second_look, suitable
-from pbrl_namo.manipulation.worlds import Worlds
+from pbrl_namo.manipulation.study import Study
+from pbrl_namo.manipulation.ways_to_move import first_look, second_look, suitable
 from pbrl_namo.manipulation.yard import Yard
 from pbrl_namo.regions.free_space import FreeSpace
 from pbrl_namo.regions.openings import Opening
@@ -40,45 +38,6 @@ from pbrl_namo.scene import NamoScene
 
 Flags = NDArray[np.bool_]
 OFTEN = 3  # things in the way that a reason tells
-
-
-@dataclass(frozen=True)
-class Study:
-    """One thing, made ready for all openings that it could make.
-
-    Attributes:
-        body: its outline.
-        worlds: it may be in.
-        commands: worth trying.
-    """
-
-    body: Body
-    worlds: Worlds
-    commands: Commands
-
-    @classmethod
-    def of(
-        cls,
-        scene: NamoScene,
-        name: str,
-        beliefs: Mapping[str, ObjectBelief],
-        rng: np.random.Generator,
-        settings: ManipulationSettings,
-    ) -> Study:
-        """Sample worlds of a thing.
-
-        Raises:
-            NamoError: nothing is believed of it, or of another outline.
-        """
-        if name not in beliefs:
-            raise NamoError(f"beliefs: expected one of {name!r}, got {', '.join(beliefs) or 'none'}; see prior_belief")
-        footprint = scene.movable[name].footprint
-        if not shapely.Polygon(footprint).equals(shapely.Polygon(beliefs[name].footprint)):
-            raise NamoError(
-                f"belief of {name!r}: expected one of the outline in the scene, got one of another; make it anew"
-            )
-        worlds = Worlds.sample(beliefs[name], scene.poses[name], rng, settings.worlds, settings.constraints)
-        return cls(Body.of(footprint), worlds, Commands.of(worlds, settings))
 
 
 def estimate(
@@ -117,6 +76,7 @@ def estimate_prepared(
     opening: Opening,
     studies: Mapping[str, Study],
     settings: ManipulationSettings,
+    been: Sequence[Array] = (),
 ) -> Estimate:
     """Estimate one opening.
 
@@ -127,38 +87,60 @@ def estimate_prepared(
         opening: one of theirs.
         studies: of the opening's object, and of those that have to go after it.
         settings: of Monte-Carlo manipulation.
+        been: poses (3,) of the object to which it is not brought back in steps [m, rad].
     """
     study, name = studies[opening.object], opening.object
     hopeless = Estimate(opening, 0.0, -settings.cost.alpha, None)
     if not len(study.commands):
         return replace(hopeless, reason=f"{name!r} cannot be moved: {_static(study)}")
+    target = target_point(yard.scene, free, roadmap, opening)
+    found, works = _in_one_grasp(yard, roadmap, opening, study, target, settings)
+    if settings.steps > 1 and not works[study.worlds.usual()].any():
+        several = estimate_in_steps(yard, free, opening, study, target, settings, been)
+        if several is not None and _worth(several, settings) > _worth(found, settings):
+            found = several
+    if found.plan is None:
+        return found
+    probability, mean = found.probability, found.reward
+    for other in opening.then:  # it has to go too, about which nothing is known yet but whether it can be moved at all
+        probability *= studies[other].worlds.mobile()
+        mean += 0.5 * hopeless.reward
+    return replace(found, probability=probability, reward=mean)
+
+
+def _worth(found: Estimate, settings: ManipulationSettings) -> float:
+    return found.probability * settings.cost.terminal + found.reward
+
+
+def _in_one_grasp(
+    yard: Yard, roadmap: Roadmap, opening: Opening, study: Study, target: Array, settings: ManipulationSettings
+) -> tuple[Estimate, Flags]:
+    """Return what is expected of an opening that is made in one manipulation, and the worlds (w,) in which it can."""
+    name, hopeless = opening.object, Estimate(opening, 0.0, -settings.cost.alpha, None)
+    nowhere: Flags = np.zeros(len(study.worlds), dtype=bool)
     grasps = reachable_grasps(yard.scene, roadmap, name, opening.start, settings)
     grasps, usable = suitable(grasps, study.worlds, study.commands, settings)
     if not grasps:
-        return replace(hopeless, reason=f"{name!r}: no grasp that suits it from where the robot is")
-    target = target_point(yard.scene, free, roadmap, opening)
+        return replace(hopeless, reason=f"{name!r}: no grasp that suits it from where the robot is"), nowhere
     roller = Roller(yard, opening, study.body, grasps, target, settings)
     ways, met = first_look(roller, study.commands, usable, settings)
     loose: Flags = np.array(study.worlds.classes()) == ModelClass.UNCONSTRAINED
     if settings.second_look and loose.any() and not ways.obeyed(loose):
         ways = ways.and_(second_look(roller, study.worlds, settings))
     if not len(ways):
-        return replace(hopeless, reason=_blocked(name, int(usable.sum()), met, yard))
+        return replace(hopeless, reason=_blocked(name, int(usable.sum()), met, yard)), nowhere
     taken = ways.efforts(study.worlds, grasps, settings.constraints.torque_arm)
     limit = settings.constraints.grip_force
     works: Flags = np.nan_to_num(taken[..., SUM], nan=np.inf) <= limit
     if not works.any():
         obeyed = taken[..., SUM][~np.isnan(taken[..., SUM])]
         why = f"takes {obeyed.min():.0f} N at least, the grips give {limit:.0f} N" if len(obeyed) else "would not obey"
-        return replace(hopeless, reason=f"{name!r}: {why}")
+        return replace(hopeless, reason=f"{name!r}: {why}"), nowhere
     rewards = reward(taken[..., TIME], taken[..., FORCE], taken[..., TORQUE], settings.cost)
     best = np.where(works, rewards, hopeless.reward).max(axis=1)
-    plan = _best_plan(roller, name, target, study.worlds, ways, taken, rewards, works, settings)
-    probability, mean = float(works.any(axis=1).mean()), float(best.mean())
-    for other in opening.then:  # it has to go too, about which nothing is known yet but whether it can be moved at all
-        probability *= studies[other].worlds.mobile()
-        mean += 0.5 * hopeless.reward
-    return Estimate(opening, probability, mean, plan)
+    plan = best_plan(grasps, roller.pose, name, target, study.worlds, ways, taken, rewards, works, settings)
+    possible: Flags = np.asarray(works.any(axis=1))
+    return Estimate(opening, float(possible.mean()), float(best.mean()), plan), possible
 
 
 def target_point(scene: NamoScene, free: FreeSpace, roadmap: Roadmap, opening: Opening) -> Array:
@@ -179,49 +161,6 @@ def target_point(scene: NamoScene, free: FreeSpace, roadmap: Roadmap, opening: O
     if not stands:
         return shapely.get_coordinates(region.representative_point())[0]
     return stands[int(np.argmax(shapely.distance(outline, shapely.points(np.array(stands)))))]
-
-
-def _best_plan(
-    roller: Roller,
-    name: str,
-    target: Array,
-    worlds: Worlds,
-    ways: WaysToMove,
-    taken: Array,
-    rewards: Array,
-    works: Flags,
-    settings: ManipulationSettings,
-) -> ManipulationPlan:
-    """Return the manipulation that does best over all worlds, where it fails costing as much as the dearest."""
-    cost = settings.cost
-    p = int(np.argmax(np.where(works, cost.terminal + rewards, -cost.alpha).mean(axis=0)))
-    grasp, pose, end = roller.grasps[ways.grasps[p]], roller.pose, roller.pose.copy()
-    motions = []
-    for k, command in enumerate(ways.motions[p]):
-        if command >= 0:
-            unit, speed, way = ways.commands.twists[command], float(ways.speeds[p, k]), float(ways.went[p, k])
-            moved(end.copy(), unit, way, end)
-            centre = centre_of(unit) if abs(unit[2]) > TURNS else None
-            motions.append(Motion(speed * unit, way / speed, centre))
-    good = np.flatnonzero(works[:, p])
-    peaks = taken[good, p, PEAK]
-    kinds = Counter(worlds.freedoms[w].model_class for w in good)
-    return ManipulationPlan(
-        object=name,
-        sides=grasp.sides,
-        contacts=grasp.contacts,
-        drive_to=compose(pose, grasp.leave),
-        stand=compose(pose, grasp.base),
-        motions=tuple(motions),
-        end=compose(end, np.zeros(3)),
-        target=target,
-        expected_force=float(peaks.mean()),
-        highest_force=float(peaks.max()),
-        works=float(works[:, p].mean()),
-        reward=float(rewards[good, p].mean()),
-        model_class=kinds.most_common(1)[0][0],
-        model=worlds.models[good[np.argsort(peaks, kind="stable")[(len(good) - 1) // 2]]],
-    )
 
 
 def _static(study: Study) -> str:

@@ -15,7 +15,7 @@ from pbrl_control.grasping.contacts import Hands, face_point, place_plates
 from pbrl_control.grasping.model_rules import BAND, GraspModel, fixed_point_angles
 from pbrl_control.grasping.settings import GraspSettings
 from pbrl_control.navigation.footprint import Footprint, reaching_arms
-from pbrl_control.planar import Array, compose, wrap
+from pbrl_control.planar import Array, compose, rotation, wrap
 from pbrl_namo.manipulation.settings import ManipulationSettings
 from pbrl_namo.regions.roadmap import Roadmap
 from pbrl_namo.scene import NamoScene
@@ -63,33 +63,49 @@ def reachable_grasps(
     outline = shapely.orient_polygons(shapely.Polygon(scene.movable[name].footprint))
     corners = np.asarray(outline.exterior.coords)[:-1]
     centre = np.asarray(outline.centroid.coords[0])
+    before = covers_before(scene.robot, settings.grasping)
     found = []
     for sample in roadmap.grasps[name]:
         if int(roadmap.regions[sample.component]) == region:
             reach = place_plates(face_point(corners, sample.contact), sample.hands, settings.grasping)
             if not isinstance(reach, str):
-                found.append(_grasp(sample.hands, reach.contacts, reach.base, centre, scene.robot, settings.grasping))
+                found.append(complete(sample.hands, reach.contacts, reach.base, centre, before, settings.grasping))
     return tuple(found)
 
 
-def _grasp(
+def complete(
     sides: Hands,
     contacts: Mapping[str, Array],
     base: Array,
     centre: Array,
-    robot: Footprint,
+    before: tuple[Array, Array],
     grasping: GraspSettings,
 ) -> Grasp:
-    """Complete a grasp from where plates and base are in the thing's frame."""
+    """Return a grasp from where plates and base are in the thing's frame.
+
+    Args:
+        sides: who grasps.
+        contacts: (2,) of each side on the outline, in the thing's frame [m].
+        base: (3,) of the base when the plates have closed, likewise [m, rad].
+        centre: (2,) of the thing, likewise [m].
+        before: outlines that robot and arms cover, see `covers_before`.
+        grasping: what the grippers can do.
+    """
     leave = compose(base, np.array([-grasping.standoff - grasping.depth, 0.0, 0.0]))
     out = np.mean([contacts[side] for side in sides], axis=0) - centre
     heading = float(base[2])
-    covers = tuple(
-        np.asarray(shapely.orient_polygons(part.swept(leave[:2], base[:2], heading)).exterior.coords)[:-1]
-        for part in (robot, reaching_arms(grasping.home[1]))
-    )
+    covers = tuple(cover @ rotation(heading).T + base[:2] for cover in before)
     angle = math.atan2(out[1], out[0])
     return Grasp(sides, dict(contacts), wrap(heading + math.pi), angle, base, leave, (covers[0], covers[1]))
+
+
+def covers_before(robot: Footprint, grasping: GraspSettings) -> tuple[Array, Array]:
+    """Return what robot and arms cover from where they leave to where the plates close (k, 2), in that base's frame."""
+    back = np.array([-grasping.standoff - grasping.depth, 0.0])
+    parts = (robot, reaching_arms(grasping.home[1]))
+    swept = [shapely.orient_polygons(part.swept(back, np.zeros(2), 0.0)) for part in parts]
+    outlines = [np.asarray(cover.exterior.coords)[:-1] for cover in swept]
+    return outlines[0], outlines[1]
 
 
 def chosen(grasps: Sequence[Grasp], wanted: Flags, settings: ManipulationSettings) -> list[int]:

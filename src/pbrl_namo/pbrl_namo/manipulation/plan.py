@@ -46,6 +46,8 @@ class ManipulationPlan:
         reward: mean over those worlds of equation 41's cost part, below zero.
         model_class: of the object in most of those worlds.
         model: its physics in the one of them in which the largest force at a grip is the median.
+        more: manipulations that are to follow before the opening is there; zero: this one makes it.
+        aside: whether the object is only put out of the way of another, and no opening is to be looked for.
     """
 
     object: str
@@ -62,6 +64,8 @@ class ManipulationPlan:
     reward: float
     model_class: ModelClass
     model: ObjectModel
+    more: int = 0
+    aside: bool = False
 
     @property
     def twist(self) -> Array:

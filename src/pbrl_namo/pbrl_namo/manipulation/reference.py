@@ -94,6 +94,16 @@ class ReferenceGrid:
             ways.append(np.vstack((start, self._middles(corners[:count].astype(np.int64)), target)))
         return ways
 
+    def field(self, taken: Flags, target: Array) -> WayField | None:
+        """Return ways to the target (2,) from everywhere [m], some pieces (m,) taken out; None where it is not free."""
+        own = self.marks_of(taken)
+        end = self._cell(target, own, taken)
+        if end is None:
+            return None
+        parents, queue = (np.empty(self.counts.size, dtype=np.int32) for _ in range(2))
+        spread(self.counts, own, end, np.array([UNSEEN - 1]), parents, queue)  # no cell: it comes everywhere
+        return WayField(self, taken, own, parents, np.asarray(target, dtype=float))
+
     def _mark(self, first: int, last: int, counts: Counts) -> None:
         pieces = self.pieces
         mark(pieces.points, pieces.starts, pieces.boxes, first, last, self.origin, self.cell, self.reach, counts)
@@ -126,3 +136,31 @@ class ReferenceGrid:
                 if point_distance(x, y, pieces.points, pieces.starts[k], pieces.starts[k + 1]) < self.radius:
                     return False
         return True
+
+
+@dataclass(frozen=True)
+class WayField:
+    """Ways to one point.
+
+    Attributes:
+        grid: it is of.
+        taken: (m,) pieces that are taken out.
+        own: (rows, columns) their counts.
+        parents: (rows * columns,) the next cell on the way from each.
+        target: (2,) in `world` [m].
+    """
+
+    grid: ReferenceGrid
+    taken: Flags
+    own: Counts
+    parents: NDArray[np.int32]
+    target: Array
+
+    def way(self, start: Array) -> Array | None:
+        """Return a way (n, 2) from a start (2,) to the target [m]; None where none is wide enough for the grid."""
+        cell = self.grid._cell(start, self.own, self.taken)
+        if cell is None or self.parents[cell] == UNSEEN:
+            return None
+        chain, corners = (np.empty(self.grid.counts.size, dtype=np.int32) for _ in range(2))
+        count = straightened(self.grid.counts, self.own, self.parents, cell, chain, corners)
+        return np.vstack((start, self.grid._middles(corners[:count].astype(np.int64)), self.target))

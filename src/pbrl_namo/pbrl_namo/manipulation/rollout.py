@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
-from pbrl_control.planar import Array, compose
+from pbrl_control.planar import Array, rotation
+from pbrl_namo.beliefs.stops import reach
 from pbrl_namo.manipulation.body import Body, circle_around
 from pbrl_namo.manipulation.grasps import Grasp
 from pbrl_namo.manipulation.opening_kernel import draw_track
 from pbrl_namo.manipulation.plane_kernel import moved
 from pbrl_namo.manipulation.policies import TURNS
+from pbrl_namo.manipulation.reference import WayField
 from pbrl_namo.manipulation.rollout_kernel import OPEN, ROBOT, THING, roll
 from pbrl_namo.manipulation.settings import ManipulationSettings, MotionSettings
 from pbrl_namo.manipulation.yard import Yard
@@ -27,6 +31,8 @@ Flags = NDArray[np.bool_]
 
 FAR_SIDEWAYS = 1e-6
 """[m] per unit of a command below which the base is not carried sideways."""
+NEVER = 1 << 60
+"""Steps between two looks for an opening that nobody wants."""
 NO_LIMIT = 1e-9
 """Share of what it can be carried sideways, per unit of a command, that limits nothing."""
 
@@ -55,12 +61,13 @@ class Roller:
         yard: the scene, prepared.
         opening: that is to be made.
         body: outline of its object.
-        grasps: g of them.
-        target: (2,) in `world`; a way from where the base then is to here is what is wanted.
+        grasps: g of them; none: everything in the room matters, see `regrasped`.
+        target: (2,) in `world`; a way from where the base then is to here is what is wanted. None: nothing is, and
+            commands are followed as far as they go.
         settings: of motion and grid.
 
     Attributes:
-        pose: (3,) of the thing in `world` as it stands [m, rad].
+        pose: (3,) of the thing in `world` at the start [m, rad].
         grasps: as given.
     """
 
@@ -70,21 +77,60 @@ class Roller:
         opening: Opening,
         body: Body,
         grasps: Sequence[Grasp],
-        target: Array,
+        target: Array | None,
         settings: ManipulationSettings,
     ) -> None:
         self.pose = np.array(yard.scene.poses[opening.object], dtype=float)
-        self.grasps = tuple(grasps)
-        self._body, self._target, self._motion = body, np.asarray(target, dtype=float), settings.motion
-        self._outlines = [outline for grasp in grasps for outline in grasp.covers]
-        self._leaves = np.array([grasp.leave[:2] for grasp in grasps]).reshape(-1, 2)
-        starts = [compose(self.pose, np.array([*leave, 0.0]))[:2] for leave in self._leaves]
-        self._ways = reference_ways(yard, opening, target, starts)
-        reach = float(np.hypot(*np.vstack((body.points, *self._outlines)).T).max())
+        self._body, self._motion = body, settings.motion
+        self._target = np.zeros(2) if target is None else np.asarray(target, dtype=float)
+        self._look = settings.motion.look if target is not None else NEVER
+        self._hold(grasps)
+        self._ways: list[Array | None] = [np.zeros((1, 2)) for _ in grasps]
+        if target is not None:
+            self._ways = reference_ways(yard, opening, target, list(self.leaves))
+        reach = float(np.hypot(*np.vstack((body.points, *self._outlines)).T).max()) if len(grasps) else math.inf
         near = _nearby(yard, opening, self.pose, 2.0 * settings.motion.way + reach)
         self._pieces, self._clusters = yard.pieces.taken(near), yard.clusters((opening.object, *opening.then))[near]
         self._clusters[yard.owned(opening.then)[near]] = -1
         self._sizes = np.array([yard.radius, self._motion.spare, self._motion.clearance, self._motion.chord])
+
+    def _hold(self, grasps: Sequence[Grasp]) -> None:
+        self.grasps = tuple(grasps)
+        self._outlines = [outline for grasp in grasps for outline in grasp.covers]
+        self._leaves = np.array([grasp.leave[:2] for grasp in grasps]).reshape(-1, 2)
+
+    @property
+    def leaves(self) -> Array:
+        """Where the base's middle is (g, 2) in `world` before it has grasped [m]."""
+        places: Array = self._leaves @ rotation(float(self.pose[2])).T + self.pose[:2]
+        return places
+
+    def regrasped(self, pose: Array, grasps: Sequence[Grasp], field: WayField | None) -> Roller:
+        """Return the same for the thing at another pose (3,), held in other ways; it must have been made with none.
+
+        Args:
+            pose: of the thing in `world` [m, rad].
+            grasps: of it.
+            field: ways to the target; None where none is wanted.
+        """
+        other = copy(self)
+        other.pose = np.array(pose, dtype=float)
+        other._hold(grasps)
+        other._ways = [np.zeros((1, 2)) for _ in grasps]
+        if field is not None:
+            other._ways = [field.way(leave) for leave in other.leaves]
+        return other
+
+    def looking(self, target: Array) -> Roller:
+        """Return the same, with a target (2,) to which a way is wanted [m]."""
+        other = copy(self)
+        other._target, other._look = np.asarray(target, dtype=float), self._motion.look
+        return other
+
+    def reference(self) -> shapely.LineString | None:
+        """Return a way in `world`, from one of the grasps to the target, that would be free without the thing."""
+        way = next((way for way in self._ways if way is not None and len(way) > 1), None)
+        return None if way is None else shapely.LineString(way)
 
     def roll(self, twists: Array, usable: Flags) -> Rollouts:
         """Follow commands (c, 3) with those grasps that they may be tried with (c, g), from where the thing stands."""
@@ -119,7 +165,7 @@ class Roller:
         hulls = np.vstack(outlines)
         held = [self.grasps[g] for g in chosen]
         left = (1.0 - used) / np.maximum(aside(twists, held, motion), NO_LIMIT)
-        ends = np.where(np.abs(twists[:, 2]) > TURNS, motion.turn, motion.way)
+        ends = reach(body.stops, pose, twists, np.where(np.abs(twists[:, 2]) > TURNS, motion.turn, motion.way))
         limits = np.where(usable & [way is not None for way in ways], np.minimum(left, ends[:, None]), 0.0)
         lines = [np.zeros((1, 2)) if way is None else way for way in ways]
         went, causes, hits = np.zeros(limits.shape), *(np.full(limits.shape, -1, dtype=np.int64) for _ in range(2))
@@ -146,7 +192,7 @@ class Roller:
             np.array([motion.step / _fastest(twist, np.vstack((body.points, hulls))) for twist in twists]),
             limits,
             self._sizes,
-            motion.look,
+            self._look,
             went,
             causes,
             hits,

@@ -86,6 +86,10 @@ class ManipulationSettings(Section):
         radii: [m] of arcs that the base drives then.
         stops: shares of how far the first motion goes, at which the second may begin.
         enough: places from which a second motion opens a way, at which the search ends.
+        steps: manipulations of one thing, with a grasp each, that an opening may take; 1: never more than one.
+        step_places: poses of the thing from which a further step is looked for.
+        step_grasps: that are tried at each of them.
+        step_spacing: [m] between those along a face.
         motion: how a held thing is moved.
         cost: of that.
         constraints: what counts as a constraint, and what the robot exerts at most.
@@ -105,6 +109,10 @@ class ManipulationSettings(Section):
     radii: tuple[Positive, ...] = (0.8, 1.6)
     stops: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0, 0.5)
     enough: Annotated[int, Field(ge=1)] = 2
+    steps: Annotated[int, Field(ge=1, le=10)] = 4
+    step_places: Annotated[int, Field(ge=1)] = 16
+    step_grasps: Annotated[int, Field(ge=1, le=100)] = 8
+    step_spacing: Positive = 0.15
     motion: MotionSettings = MotionSettings()
     cost: CostSettings = CostSettings()
     constraints: ConstraintSettings = ConstraintSettings()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrl_control.constraints.classes import ConstraintSettings, Freedom, ModelClass, hinge_centre
 from pbrl_control.constraints.object_model import ObjectModel
@@ -80,9 +82,33 @@ class Worlds:
     def __len__(self) -> int:
         return len(self.models)
 
+    def only(self, world: int) -> Worlds:
+        """Return one of them."""
+        one = slice(world, world + 1)
+        return Worlds(self.models[one], self.freedoms[one], self.projections[one], self.physics[one])
+
     def classes(self) -> list[ModelClass]:
         """Return the model class in each world."""
         return [freedom.model_class for freedom in self.freedoms]
+
+    def usual(self) -> NDArray[np.bool_]:
+        """Say which worlds (w,) are of the class that most are of in which the thing can be moved; none if in none."""
+        classes = self.classes()
+        kinds = Counter(each for each in classes if each != ModelClass.STATIC)
+        most = kinds.most_common(1)[0][0] if kinds else None
+        return np.array([each == most for each in classes], dtype=bool)
+
+    def typical(self) -> int:
+        """Return the world in the middle of the usual ones, by the point that the thing turns about.
+
+        Raises:
+            NamoError: the thing can be moved in none.
+        """
+        usual = np.flatnonzero(self.usual())
+        if not len(usual):
+            raise NamoError("worlds: expected one in which the thing can be moved, got none")
+        anchors = np.array([self.freedoms[w].anchor for w in usual])
+        return int(usual[np.argmin(np.hypot(*(anchors - np.median(anchors, axis=0)).T))])
 
     def mobile(self) -> float:
         """Return the share of worlds in which the thing can be moved at all."""

@@ -198,6 +198,21 @@ def _face_points(
     return np.concatenate(points), np.concatenate(normals)
 
 
+def even_points(footprint: Array, hands: Hands, spacing: float, settings: GraspSettings) -> Array:
+    """Return points (n, 2) at equal distances on the faces of an outline (k, 2) that hands can grasp it at [m].
+
+    What is long enough of each face is cut into equal parts of at most the spacing [m], with a point in the middle of
+    each; two at least.
+    """
+    room, points = _room(hands, settings), [np.zeros((0, 2))]
+    for start, along, length in zip(*_faces(footprint), strict=True):
+        wide = float(length) - 2.0 * room
+        if wide > 0.0:
+            count = max(2, math.ceil(wide / spacing))
+            points.append(start + (room + wide * (np.arange(count) + 0.5) / count)[:, None] * along)
+    return np.concatenate(points)
+
+
 def _facing(points: Array, normals: Array) -> Array:
     """Return poses (n, 3) at points of faces that look inwards."""
     return np.column_stack((points, normals + math.pi))

@@ -76,6 +76,25 @@ def openings(scene: NamoScene, free: FreeSpace, roadmap: Roadmap) -> tuple[Openi
     return tuple(sorted(found | _chains(cells, reachable, found, len(free.regions))))
 
 
+def closers(scene: NamoScene, free: FreeSpace, start: int, goal: int) -> tuple[Opening, ...]:
+    """Return what stands between two regions, whether it can be grasped or not: fewest things to go first.
+
+    Args:
+        scene: things where they stand.
+        free: its free space, nothing left out.
+        start: region that the robot is in.
+        goal: region that is wanted.
+    """
+    cells = cut_floor(scene, free)
+    found = []
+    for bit, name in enumerate(cells.names):
+        ends = fewest_in_the_way(cells, start, 1 << bit)
+        if goal in ends:
+            then = tuple(other for other in cells.things(ends[goal][0]) if other != name)
+            found.append(Opening(start, goal, name, then))
+    return tuple(sorted(found, key=lambda each: (len(each.then), each)))
+
+
 def cut_off(free: FreeSpace, found: Sequence[Opening], start: int) -> tuple[int, ...]:
     """Return the regions that no sequence of openings reaches from a region, in order.
 

@@ -1,0 +1,53 @@
+"""Compiling ahead: numba compiles each kernel when it is first called, and no robot should wait for that."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+
+from pbrl_bag.types import Recording
+from pbrl_model.parameters import BodyParameters
+from pbrl_namo.beliefs.belief import ObjectBelief
+from pbrl_namo.errors import NamoError
+from pbrl_namo.executive.jobs import GraspJob, PlanJob
+from pbrl_namo.executive.ways import find_grasp, find_way
+from pbrl_namo.scene import Movable, NamoScene
+from pbrl_namo.thinking import Thoughts
+
+Corners = list[tuple[float, float]]
+SQUARE: Corners = [(-0.4, -0.4), (0.4, -0.4), (0.4, 0.4), (-0.4, 0.4)]
+LONG: Corners = [(-0.375, -0.75), (0.375, -0.75), (0.375, 0.75), (-0.375, 0.75)]
+
+
+@cache
+def compile_kernels() -> None:
+    """Plan in a small room, find a grasp and a way there: whatever planning calls is compiled, or loaded, after this.
+
+    Some tens of seconds on a machine that has never planned, half a second later on; once in a process.
+    """
+    room = np.array([(0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0)])
+    movable = {"square": Movable(np.array(SQUARE), mass=33.0), "long": Movable(np.array(LONG), mass=38.0)}
+    poses = {"square": np.array([3.0, 0.85, 0.0]), "long": np.array([3.0, 2.8, 0.0])}
+    start, goal = np.array([0.9, 2.0, 0.0]), np.array([5.2, 2.0, math.nan])
+    scene = NamoScene.of(room, {}, movable, poses, start, goal)
+    pinned = BodyParameters(mass=38.0, wheel_x=0.3, wheel_y=0.65, mu_x=0.25, mu_y=0.25, mu_ground=0.02)
+    stuck = BodyParameters(mass=300.0, mu_x=0.9, mu_y=0.9, mu_ground=0.9)
+    known = {
+        name: ObjectBelief(movable[name].footprint, parameters.to_vector()[None])
+        for name, parameters in {"square": stuck, "long": pinned}.items()
+    }
+    thoughts = Thoughts(_nothing)
+    for beliefs in ({}, known):
+        answer = thoughts.plan(PlanJob(scene, beliefs, {}, 1))
+        if answer.move is not None:
+            find_grasp(GraspJob(scene, answer.move, (), 1))
+    try:
+        find_way(NamoScene.of(room, {}, {}, {}, start, goal), 1)
+    except NamoError:
+        return
+
+
+def _nothing(begin: float, end: float) -> Recording:
+    raise NamoError(f"recording: nothing was recorded between {begin} and {end} s")

@@ -1,0 +1,99 @@
+"""Rooms that conceal something: it is met on the way of what looks best, another way is left; rows by hand."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbrl_bringup.errors import BringupError
+from pbrl_bringup.experiments import namo_concealed, namo_concealed_rooms
+from pbrl_bringup.experiments.namo_concealed import REPAIRED, SURPRISES, Pair, rows_of
+from pbrl_bringup.experiments.namo_concealed_rooms import (
+    CARPET,
+    KINDS,
+    SQUARE,
+    TETHER,
+    UNSEEN,
+    draw_concealing,
+    seen_room,
+    track,
+)
+from pbrl_bringup.experiments.namo_figure import draw
+from pbrl_bringup.namo_run import Moment, NamoOutcome
+from pbrl_namo.executive import State
+from pbrl_namo.executive.mission import job_seed
+from pbrl_namo.planner import NamoSettings, plan
+from pbrl_namo.thinking import unlearned
+
+EFFECTS = {CARPET: "floor_patch", TETHER: "tether", UNSEEN: "unseen_body"}
+
+
+def outcome(reached: bool, repaired: float = 0.0, surprises: float = 1.0) -> NamoOutcome:
+    state = State.DONE if reached else State.FAILED
+    moment = Moment(3.0, str(State.PLANNING), "plans", (0.0, 0.0, 0.0), {SQUARE: (2.6, 0.9, 0.0)}, SQUARE)
+    rows = {REPAIRED: repaired, SURPRISES: surprises, "overall planning time [s]": 0.5, "calls to UpdateModel": 1.0}
+    room = ((-1.5, -2.3), (6.0, -2.3), (6.0, 2.3), (-1.5, 2.3))
+    outline = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
+    return NamoOutcome(str(state), "said", 100.0, rows, (moment,), 0.02, room, {SQUARE: outline}, (5.0, 0.0))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_first_thing_that_is_planned_meets_what_is_concealed(kind: str) -> None:
+    room = draw_concealing(np.random.default_rng([3, KINDS.index(kind)]), kind)
+    told = room.scene.concealed.model_dump(exclude_defaults=True)
+    assert set(told) == {EFFECTS[kind]}
+    assert set(room.scene.bodies) == {SQUARE, namo_concealed_rooms.CUPBOARD}
+    pose, start = np.array(room.scene.bodies[SQUARE].pose), np.array(room.scene.robot.pose)
+    seen = seen_room(pose, start, room.goal)
+    believed = unlearned(seen.movable[SQUARE], NamoSettings())
+    chosen = plan(seen, {SQUARE: believed}, job_seed(room.seed, 1)).chosen
+    assert chosen is not None
+    assert chosen.plan is not None
+    stops = []
+    for share in (0.35, 0.45, 0.55):
+        meeting = namo_concealed_rooms._meeting(kind, seen, chosen.plan, share)
+        stops += [] if meeting is None else [meeting.stop]
+    poses = track(seen, chosen.plan)
+    for stop in stops:
+        assert stop.beyond(poses[0]) < 0.0
+        assert float(stop.beyond(poses).max()) > 0.0
+    assert stops
+    assert all(np.isfinite(shape).all() for shape in room.outlines())
+
+
+def test_the_same_draws_give_the_same_room() -> None:
+    one, other = (draw_concealing(np.random.default_rng(5), TETHER) for _ in range(2))
+    assert one.scene == other.scene
+    assert one.seed == other.seed
+    assert one.goal.tobytes() == other.goal.tobytes()
+    assert math.isnan(one.goal[2])
+
+
+def test_what_is_none_of_the_kinds_is_refused() -> None:
+    with pytest.raises(BringupError, match="expected one of carpet edge, tether, unseen body, got 'draught'"):
+        draw_concealing(np.random.default_rng(0), "draught")
+
+
+def test_rows_count_both_learners_in_the_same_rooms() -> None:
+    pairs = [Pair(kind, outcome(True, 1.0), outcome(number == 0)) for number in range(2) for kind in KINDS]
+    first = rows_of(pairs)[0]
+    assert first.value == pytest.approx(0.5)
+    assert first.holds
+    found = rows_of(pairs)[-1]
+    assert found.value == 6
+    worse = rows_of([Pair(CARPET, outcome(False), outcome(True))])
+    assert not worse[0].holds
+
+
+def test_both_strips_are_drawn_with_what_is_concealed(tmp_path: Path) -> None:
+    shapes = [np.array([[3.0, 1.0], [4.0, 1.0], [4.0, 2.0]])]
+    assert draw(outcome(True), tmp_path, shapes).name == "figure.png"
+    assert draw(outcome(False), tmp_path, shapes, "plain").name == "plain.png"
+    assert (tmp_path / "plain.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_kinds_take_turns() -> None:
+    assert [namo_concealed.room_of(2, number).kind for number in range(3)] == list(KINDS)
