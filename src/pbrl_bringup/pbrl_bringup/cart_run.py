@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pbrl_bringup.cart.navigator import PATIENCE, Answer, Navigator
 from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
-from pbrl_bringup.cart.outline import motions
 from pbrl_bringup.cart.senses import CartSenses
 from pbrl_control.cart import CartBody, CartCommand, CartController, CartLimits, CartPlan, CartSettings, DriveStatus
 from pbrl_control.planar import Array, compose, wrap
+from pbrl_planner.cart.navigator import PATIENCE, Answer, Navigator
+from pbrl_planner.cart.outline import motions
 from pbrl_planner.lattice import LatticePlan, LatticeSettings, Motions
 from pr2_cart_sim.scene import OfficeScene
 from pr2_cart_sim.sensing import in_base

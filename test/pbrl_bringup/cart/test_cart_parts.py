@@ -8,16 +8,16 @@ import math
 import numpy as np
 import pytest
 
-from pbrl_bringup.cart.navigator import Answer, Navigator, PlannerCall, free_start, grid_of, with_room
 from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
-from pbrl_bringup.cart.outline import ARTICULATION, GRIP, frame_at_grip, motions, pr2_with
-from pbrl_bringup.cart.shoulders import BEYOND, with_shoulders
-from pbrl_bringup.cart.whereabouts import Whereabouts
 from pbrl_bringup.cart_run import AHEAD, onward
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments.cart_kept import keep_leg, read_leg
 from pbrl_bringup.experiments.cart_office import route, rows_of
+from pbrl_control.cart.whereabouts import Whereabouts
 from pbrl_control.planar import compose, inverse, wrap
+from pbrl_planner.cart.navigator import Answer, Navigator, PlannerCall, free_start, grid_of, with_room
+from pbrl_planner.cart.outline import ARTICULATION, GRIP, frame_at_grip, motions, pr2_with
+from pbrl_planner.cart.shoulders import BEYOND, with_shoulders
 from pbrl_planner.costmap import LETHAL, CostField, StaticMap
 from pbrl_planner.lattice import Lattice, LatticeProblem, LatticeSettings, plan
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pbrl_bringup.cart.navigator import Answer
-from pbrl_bringup.cart.outline import POSTURE
 from pbrl_bringup.cart_run import run_cart
 from pbrl_bringup.experiments.cart_office_figure import draw
+from pbrl_planner.cart.navigator import Answer
+from pbrl_planner.cart.outline import POSTURE
 from pr2_cart_sim.maps import FREE, OCCUPIED, GridMap, save_map
 from pr2_cart_sim.scene import OfficeScene
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pbrl_bringup.cart.navigator import PlannerCall
+from pbrl_planner.cart.navigator import PlannerCall
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ from functools import singledispatchmethod
 import numpy as np
 
 from bullet_sim.observations import GraspState, JointStates, KnownScene, RobotDescription
-from pbrl_bringup.cart.outline import GRIP, frame_at_grip, pr2_with
-from pbrl_bringup.cart.shoulders import with_shoulders
-from pbrl_bringup.cart.whereabouts import Whereabouts
 from pbrl_control.cart import CartBody, CartPercept, CartSight, choose_sight
+from pbrl_control.cart.whereabouts import Whereabouts
 from pbrl_control.planar import Array, compose
 from pbrl_control.pr2_arms import Pr2Arms
+from pbrl_planner.cart.outline import GRIP, frame_at_grip, pr2_with
+from pbrl_planner.cart.shoulders import with_shoulders
 from pbrl_planner.costmap import CostField, Costmap, CostmapSettings, EvidenceSettings, RangeScan, Recovery, StaticMap
 from pr2_cart_sim.observations import BaseOdometry, CartReading, KnownMap, Localisation, Scan
 

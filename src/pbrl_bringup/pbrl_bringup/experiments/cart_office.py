@@ -17,14 +17,14 @@ import numpy as np
 
 from bullet_sim.settings import parse_settings
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
-from pbrl_bringup.cart.navigator import PROVED, PlannerCall
 from pbrl_bringup.cart.outcome import CartOutcome
-from pbrl_bringup.cart.outline import POSTURE
 from pbrl_bringup.cart_run import run_cart
 from pbrl_bringup.experiments.cart_kept import keep_leg, read_leg
 from pbrl_bringup.experiments.cart_office_figure import draw
 from pbrl_bringup.parallel import in_parallel
 from pbrl_control.planar import Array, compose
+from pbrl_planner.cart.navigator import PROVED, PlannerCall
+from pbrl_planner.cart.outline import POSTURE
 from pr2_cart_sim.floor_plan import OfficePlan
 from pr2_cart_sim.make_office import AHEAD, write_office
 from pr2_cart_sim.scene import OfficeScene, load_office

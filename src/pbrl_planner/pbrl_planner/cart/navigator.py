@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -27,6 +28,9 @@ MORE_ROOM = 2
 """Cells by which a robot that stands too near to something is given room."""
 NEAR_CELLS = 2
 """Cells around the robot's place in which a state to start from is looked for."""
+
+Improved = Callable[[LatticePlan], bool | None]
+"""Is given each solution as soon as it is there; returns True: it is good enough."""
 
 
 class Answer(StrEnum):
@@ -90,8 +94,17 @@ class Navigator:
         self._motions, self._settings = motions, settings
         self.calls: list[PlannerCall] = []
 
-    def plan(self, now: float, field: CostField, start: Array, goal: Array) -> LatticePlan | None:
+    @property
+    def resolution(self) -> float:
+        """Of the cells that it plans on [m]."""
+        return self._motions.primitives.resolution
+
+    def plan(
+        self, now: float, field: CostField, start: Array, goal: Array, improved: Improved | None = None
+    ) -> LatticePlan | None:
         """Plan from a pose (4,) to a pose (3,) of `base`, cart straight, at the simulated time `now` [s].
+
+        Each solution is given to `improved`, as to `pbrl_planner.lattice.plan`'s.
 
         Returns:
             None without a plan; why is in the last of `calls`.
@@ -115,8 +128,9 @@ class Navigator:
             return None
         first: list[float] = []
 
-        def note(_: LatticePlan) -> None:
+        def note(each: LatticePlan) -> bool:
             first.append(time.process_time() - began)
+            return improved is not None and improved(each) is True
 
         made = plan(problem, self._settings, note)
         spent = 0
