@@ -15,4 +15,12 @@ setup(
     ],
     install_requires=["numba", "numpy", "ompl", "opencv-python-headless", "pydantic", "scipy", "shapely"],
     zip_safe=False,
+    entry_points={
+        "console_scripts": [
+            "costmap_node = pbrl_planner.ros.costmap_node:main",
+            "lattice_planner_node = pbrl_planner.ros.lattice_planner_node:main",
+            "cart_controller_node = pbrl_planner.ros.cart_controller_node:main",
+            "cart_navigator_node = pbrl_planner.ros.cart_navigator_node:main",
+        ],
+    },
 )
