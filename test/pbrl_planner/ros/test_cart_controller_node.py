@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ def test_it_drives_to_the_end_of_a_path(driving: Driving) -> None:
     assert np.abs(driving.stage.pose - [1.6, 1.5, 0.0]).max() < 0.021
     assert driving.speed() == 0.0, "the last command stops it"
     left = [each.remaining for each in driving.told]
-    assert left[0] > 1.5 and left[-1] < 0.2 and all(a >= b - 1e-9 for a, b in zip(left, left[1:], strict=False))
+    assert left[0] > 1.5 and left[-1] < 0.2 and all(a >= b - 1e-9 for a, b in pairwise(left))
     assert driving.arms and len(driving.arms[0].data) == 7
     assert driving.status[-1].data == "arrived"
 
