@@ -168,7 +168,7 @@ def call(answer: Answer, epsilon: float | None = 1.0) -> PlannerCall:
 
 
 def leg(*calls: PlannerCall, contacts: tuple[Touch, ...] = ()) -> CartOutcome:
-    score = Score(contacts, 0.4, None, (0.01, 0.02), (0.01, 0.0), 0.02, 0.01, 5.0)
+    score = Score(contacts, 0.4, None, (0.01, 0.02), (0.01, 0.0), (1e-3, 2e-3), 0.02, 0.01, 5.0)
     trace = (Trace(0.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "on the way", "", {"a": (1.0, 2.0)}),)
     return CartOutcome(True, "at the goal", 20.0, calls, trace, score, (1.0, 0.0, 0.0), ((0.0, 0.0),), ())
 

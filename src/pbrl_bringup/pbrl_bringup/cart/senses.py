@@ -100,6 +100,10 @@ class CartSenses:
         maps = [each for each in (self.local, self.whole) if each is not None]
         return [step for each in maps for step in (each.clear_inside(own), each.clear_unconfirmed())]
 
+    def forget_unseen(self, now: float, age: float) -> list[Recovery]:
+        """Take out of both costmaps what nobody has seen for so long [s]: who stood there may have walked on."""
+        return [each.clear_unseen(now, age) for each in (self.local, self.whole) if each is not None]
+
     def _own(self, time: float) -> list[Array]:
         """Return outlines of robot and cart in `map` at a time [s]; none where nothing is known of them."""
         pose, sight = self.whereabouts.pose(time), self.sight(time)
