@@ -36,10 +36,10 @@ LONGEST = 300.0
 """Simulated time after which a leg is given up [s]."""
 BLOCKED = 2.0
 """Time before something that is in the way after which a way round it is looked for [s]."""
-RETRY, RETRY_MOST = 2.0, 8.0
+RETRY, RETRY_MOST = 2.0, 6.0
 """Time between two calls of the planner of which the first found nothing [s]; twice as long after each more, at most
 the second: that there is no path is true of a moment, and people walk on."""
-UNSEEN = 10.0
+UNSEEN = 5.0
 """Time after which something that nobody has seen since is taken to be gone, where it leaves no path [s]."""
 REFRESH = 15.0
 """Time on one plan after which it is made again: the floor is better known by then [s]."""
@@ -179,8 +179,8 @@ class CartRun:
         made = self._asked(now, floor, here)
         if made is None and self.navigator.calls[-1].answer is Answer.SHUT_IN:
             self.senses.recover(now)
-        elif made is None:
-            self.senses.forget_unseen(now, UNSEEN)
+        elif made is None and any(len(each.places) for each in self.senses.forget_unseen(now, UNSEEN)):
+            self._pause, self._next_plan = RETRY, now + RETRY
         if made is None:
             return
         self._going = _Going(made, self._controller(np.vstack([here, made.poses]), body), now)

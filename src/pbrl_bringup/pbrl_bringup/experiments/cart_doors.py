@@ -38,14 +38,14 @@ DOOR = cells_of(CART_WIDTH + BEYOND)
 NARROWEST = cells_of(2.0 * PR2_HALF)
 """[cells] narrower than the robot; nothing gets through."""
 WIDEST = cells_of(1.6)
-CORRIDORS = (1.6, 1.8, 1.9, 2.0, 2.2)
+CORRIDORS = (1.4, 1.6, 1.8, 2.0, 2.2)
 """[m] off which the doorways are."""
 OUT = (1.2, 1.4, 1.6)
 """[m] of corridors behind the doorways."""
 CORNERS = cells_of(0.9), cells_of(1.6)
-FROM, TO = cells_of(1.2), cells_of(2.4)
+FROM, TO = cells_of(1.2), cells_of(2.6)
 """Corridors off which a doorway of the size wanted is tried [cells]."""
-OFFICE = 2.2
+OFFICE = 1.9
 """[m] an office's corridor."""
 
 Pair = dict[str, Least]
@@ -103,14 +103,19 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
     drive = {} if quick else {each.what: pair_of(each, drive_motions()) for each in office_scenes()}
     before = thesis[f"corridor before a doorway of {DOOR * CELL:.2f} m"]
     rows = [passed_row(before), *[narrower_row(what, pair) for what, pair in thesis.items()]]
-    rows += [narrower_row(f"{what}, outlines of the drive", pair) for what, pair in drive.items()]
+    rows += [narrower_row(f"{what}, with elbows and margins", pair) for what, pair in drive.items()]
     every = [least for pair in (*thesis.values(), *drive.values()) for least in pair.values()]
     rows.append(
         at_least(
             "widths that were too narrow, proved by exhaustion, share", _share([e.proved for e in every]), "1", 1.0
         )
     )
-    draw(before[BENT], partial(into_door, DOOR), {**thesis, **{f"{k} (drive)": v for k, v in drive.items()}}, out)
+    draw(
+        before[BENT],
+        partial(into_door, DOOR),
+        {**thesis, **{f"{what},\nwith elbows and margins": pair for what, pair in drive.items()}},
+        out,
+    )
     return Measured(rows, {"thesis": told(thesis), "drive": told(drive)})
 
 
@@ -149,7 +154,7 @@ def told(pairs: dict[str, Pair]) -> dict[str, Any]:
     """Return what there is to say of least widths."""
     return {
         what: {
-            kind: {"width": least.width, "proved": least.proved, "cost": least.plan.cost}
+            kind: {"width": least.width, "proved": least.proved, "cost": -1 if least.plan is None else least.plan.cost}
             for kind, least in pair.items()
         }
         for what, pair in pairs.items()

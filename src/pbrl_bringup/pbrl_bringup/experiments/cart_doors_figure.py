@@ -33,7 +33,7 @@ def draw(
     figure = Figure(figsize=(13.0, 5.6), layout="constrained")
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.0])
-    if passed.cells is not None:
+    if passed.cells is not None and passed.plan is not None:
         body, poses = ArticulatedBody.pr2_with_cart(), passed.plan.poses
         draw_passage(left, passage(passed.cells))
         draw_sweep(left, body, poses)
@@ -55,13 +55,15 @@ def draw_widths(axes: Axes, widths: Mapping[str, Mapping[str, Least]]) -> None:
     names = list(widths)[::-1]
     for row, name in enumerate(names):
         pair = widths[name]
-        axes.plot([each.width for each in pair.values()], [row] * len(pair), color="#c9ccd1", lw=2.5, zorder=1)
+        axes.plot([100.0 * each.width for each in pair.values()], [row] * len(pair), color="#c9ccd1", lw=2.5, zorder=1)
         for kind, (colour, marker) in STYLES.items():
-            axes.plot(pair[kind].width, row, marker, color=colour, ms=8, zorder=3, label=kind if row == 0 else None)
+            axes.plot(
+                100.0 * pair[kind].width, row, marker, color=colour, ms=8, zorder=3, label=kind if row == 0 else None
+            )
             aside = -9 if kind == BENT else 9
             axes.annotate(
-                f"{pair[kind].width:.3g}",
-                (pair[kind].width, row),
+                f"{100.0 * pair[kind].width:.1f}",
+                (100.0 * pair[kind].width, row),
                 (aside, 0),
                 textcoords="offset points",
                 ha="right" if aside < 0 else "left",
@@ -70,11 +72,21 @@ def draw_widths(axes: Axes, widths: Mapping[str, Mapping[str, Least]]) -> None:
                 color=colour,
             )
     for at, words in ((CART_WIDTH, "cart"), (2.0 * PR2_HALF, "robot")):
-        axes.axvline(at, color="#c0392b", lw=0.8, ls=":")
-        axes.text(at, len(names) - 0.45, words, color="#c0392b", fontsize=8, ha="center")
+        axes.axvline(100.0 * at, color="#c0392b", lw=0.8, ls=":")
+        axes.text(
+            100.0 * at,
+            0.03,
+            words,
+            color="#c0392b",
+            fontsize=8,
+            rotation=90,
+            ha="right",
+            va="bottom",
+            transform=axes.get_xaxis_transform(),
+        )
     axes.set_yticks(range(len(names)), names, fontsize=8)
     axes.margins(x=0.12, y=0.05)
-    axes.set_xlabel("least width [m]")
+    axes.set_xlabel("least width [cm]")
     axes.set_title("Least widths: what is left of the mark is proved too narrow", fontsize=9)
     axes.grid(axis="x", color="#eeeeee", zorder=0)
     axes.spines[["top", "right"]].set_visible(False)

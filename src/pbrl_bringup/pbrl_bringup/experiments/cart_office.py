@@ -19,7 +19,6 @@ from bullet_sim.settings import parse_settings
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.cart.navigator import PROVED
 from pbrl_bringup.cart.outcome import CartOutcome
-from pbrl_bringup.cart.outline import POSTURE
 from pbrl_bringup.cart_run import run_cart
 from pbrl_bringup.experiments.cart_kept import keep_leg, read_leg
 from pbrl_bringup.experiments.cart_office_figure import draw
@@ -41,6 +40,8 @@ FAR = 0.5
 """Of the greatest distance between two goals of an office, which the next goal is away at least."""
 MANNERS = {"social": True, "step_in_rate": 1.0}
 """People stop before robot and cart; now and then somebody steps in front of them."""
+TILT = {"rate": 0.5, "increment": 0.1}
+"""Of the tilting laser, to which nobody listens here: each of its scans takes as long as one of the base's."""
 PEOPLE = 3
 """Who walk to and fro. They go straight on: in a corridor where none can pass beside the cart each stops all others."""
 FIRST_PLAN, SHARE_OPTIMAL = 0.05, 0.95
@@ -162,11 +163,13 @@ def drive(leg: Leg, seed: int, longest: float, path: Path) -> None:
 def scene_of(office: OfficeScene, start: Array) -> OfficeScene:
     """Return an office with the robot and its cart at a pose (3,) of `base`, and people of the experiment's manners."""
     cart = compose(start, np.array([AHEAD, 0.0, 0.0]))
-    robot = office.robot.model_copy(update={"pose": tuple(map(float, start)), "posture": POSTURE})
+    robot = office.robot.model_copy(update={"pose": tuple(map(float, start))})
+    tilt = office.sensors.tilt_laser.model_copy(update=TILT)
     held = office.bodies["cart"].model_copy(update={"pose": tuple(map(float, cart))})
     return office.model_copy(
         update={
             "robot": robot,
+            "sensors": office.sensors.model_copy(update={"tilt_laser": tilt}),
             "bodies": {**office.bodies, "cart": held},
             "manners": office.manners.model_copy(update=MANNERS),
         }

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bringup.cart.outline import ARTICULATION, KEPT, pr2_with
+from pbrl_planner.errors import PlannerError
 from pbrl_planner.lattice import (
     ArticulatedBody,
     CostGrid,
@@ -39,6 +40,11 @@ BESIDE = 0.50
 """From the inner wall of a corner to the middle of the robot at start and goal [m]."""
 WALL = 6
 """Thickness of a wall with a door in it [cells]."""
+NARROW, WIDE = 1.4, 3.0
+"""Width of the room behind a door [m]: in the narrow one robot and cart cannot turn round, so that the cart has to go
+in first; into the wide one they can go backwards, and turn round inside."""
+DEPTH = 2.6
+"""Of the room [m]."""
 
 Pose = tuple[float, float, float, float]
 
@@ -85,37 +91,38 @@ def corner(width: int) -> Passage:
     )
 
 
-def into_door(door: int, corridor: int) -> Passage:
+def into_door(door: int, corridor: int, room: float = NARROW) -> Passage:
     """Return a corridor with a doorway in its right wall, in the middle of which the origin is, and a room behind.
 
     Args:
         door: width of the doorway [cells].
         corridor: width of the corridor [cells].
+        room: width of the room [m].
     """
-    free, origin = _room_and_corridor(door, corridor)
+    free, origin = _room_and_corridor(door, corridor, room)
     return Passage(free, origin, (-2.0, BESIDE, 0.0, 0.0), (0.0, -WALL * CELL - PR2_HALF - 0.05, -math.pi / 2.0, 0.0))
 
 
-def out_of_door(door: int, corridor: int) -> Passage:
+def out_of_door(door: int, corridor: int, room: float = NARROW) -> Passage:
     """Return the same floor the other way: out of the room, and to the right along the corridor."""
-    free, origin = _room_and_corridor(door, corridor)
+    free, origin = _room_and_corridor(door, corridor, room)
     # The right of who comes out is where x grows.
     return Passage(free, origin, (0.0, -WALL * CELL - LENGTH - 0.05, math.pi / 2.0, 0.0), (0.9, BESIDE, 0.0, 0.0))
 
 
 def open_floor(away: float) -> Passage:
     """Return a floor without walls: a turn by 90 degrees to the right, the goal as far ahead as aside [m]."""
-    half = cells_of(LENGTH + 2.5)
+    half = cells_of(LENGTH + away + 0.5)
     free = np.ones((2 * half, 2 * half), dtype=bool)
     low = -half * CELL - CELL
     return Passage(_walled(free), (low, low), (-away, 0.0, 0.0, 0.0), (0.0, -away, -math.pi / 2.0, 0.0))
 
 
-def _room_and_corridor(door: int, corridor: int) -> tuple[NDArray[np.bool_], tuple[float, float]]:
+def _room_and_corridor(door: int, corridor: int, room: float) -> tuple[NDArray[np.bool_], tuple[float, float]]:
     """Return what is occupied, and its origin: x along the corridor, y out of the room."""
-    half, depth = cells_of(3.6), cells_of(2.6)
+    half, inside, depth = cells_of(3.6), cells_of(room / 2.0), cells_of(DEPTH)
     free = np.zeros((depth + WALL + corridor, 2 * half), dtype=bool)
-    free[:depth, half - cells_of(1.5) : half + cells_of(1.5)] = True
+    free[:depth, half - inside : half + inside] = True
     free[depth + WALL :] = True
     free[depth : depth + WALL, half - (door + 1) // 2 : half + door // 2] = True
     return _walled(free), (-half * CELL - CELL, -(depth + WALL) * CELL - CELL)
@@ -152,10 +159,14 @@ def drive_motions() -> dict[str, Motions]:
     }
 
 
-def solve(passage: Passage, motions: Motions) -> LatticePlan:
-    """Return the quickest plan, or the proof that there is none."""
+def solve(passage: Passage, motions: Motions) -> LatticePlan | None:
+    """Return the quickest plan, or the proof that there is none; None: there is no room to start or to end."""
     grid = CostGrid.of_occupied(passage.occupied, CELL, passage.origin)
-    return plan(LatticeProblem(Lattice(grid, motions), passage.start, passage.goal), PATIENCE)
+    try:
+        problem = LatticeProblem(Lattice(grid, motions), passage.start, passage.goal)
+    except PlannerError:
+        return None
+    return plan(problem, PATIENCE)
 
 
 @dataclass(frozen=True)
@@ -164,13 +175,13 @@ class Least:
 
     Attributes:
         cells: it; None: not with the greatest that was tried either.
-        plan: with that width; the proof that there is none where there is no such width.
+        plan: with that width; None where there is no such width.
         refused: the greatest width [cells] of which it is proved that there is no plan; None: the least had one.
         proved: whether every failure was a proof.
     """
 
     cells: int | None
-    plan: LatticePlan
+    plan: LatticePlan | None
     refused: int | None
     proved: bool
 
@@ -186,14 +197,14 @@ def least_width(passage: Callable[[int], Passage], motions: Motions, low: int, h
     What is passed once is passed in all that is wider: start and goal stay, and no wall comes in.
     """
     best = solve(passage(high), motions)
-    if not best.found:
-        return Least(None, best, high, best.exhausted)
+    if best is None or not best.found:
+        return Least(None, None, high, best is None or best.exhausted)
     refused, proved = low - 1, True
     while high - refused > 1:
         middle = (refused + high) // 2
         found = solve(passage(middle), motions)
-        if found.found:
+        if found is not None and found.found:
             high, best = middle, found
         else:
-            refused, proved = middle, proved and found.exhausted
+            refused, proved = middle, proved and (found is None or found.exhausted)
     return Least(high, best, refused if refused >= low else None, proved)

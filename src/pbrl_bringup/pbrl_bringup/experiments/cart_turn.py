@@ -2,8 +2,8 @@
 
 The quickest plan is not the one that sweeps least. So both are trimmed alike: pieces are taken off the floor where the
 plan sweeps, one after the other, as long as there is still a plan, and the least that was ever swept counts.
-Where there is room, an articulated cart saves little; in a corridor with a doorway it saves most, which is why the
-scenes are shown one by one, those where it helps little among them.
+Where there is room, an articulated cart saves little. It saves most where a cart held straight has to go into a room
+backwards and turn round inside. So every scene is a row of its own, those where it helps little among them.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from pbrl_bringup.experiments.cart_passages import (
     BENT,
     CELL,
     STRAIGHT,
+    WIDE,
     Passage,
     cells_of,
     corner,
@@ -76,15 +77,17 @@ def scenes(quick: bool) -> dict[str, Passage]:
     The doorways are the narrowest which the cart held straight still gets through from that corridor.
     """
     found = {
-        "doorway, corridor 1.9 m": into_door(cells_of(0.70), cells_of(1.9)),
+        "into a room, corridor 1.8 m": into_door(cells_of(0.75), cells_of(1.8), WIDE),
         "corner, corridors 1.25 m": corner(cells_of(1.25)),
         "open floor": open_floor(1.0),
     }
     more = {
-        "doorway, corridor 1.6 m": into_door(cells_of(0.85), cells_of(1.6)),
-        "doorway, corridor 1.8 m": into_door(cells_of(0.75), cells_of(1.8)),
-        "doorway, corridor 2.2 m": into_door(cells_of(0.70), cells_of(2.2)),
-        "out of a doorway, corridor 1.4 m": out_of_door(cells_of(1.0), cells_of(1.4)),
+        "into a room, corridor 1.6 m": into_door(cells_of(0.85), cells_of(1.6), WIDE),
+        "into a room, corridor 1.9 m": into_door(cells_of(0.70), cells_of(1.9), WIDE),
+        "into a room, corridor 2.2 m": into_door(cells_of(0.70), cells_of(2.2), WIDE),
+        "into a closet, corridor 1.4 m": into_door(cells_of(1.25), cells_of(1.4)),
+        "into a closet, corridor 1.6 m": into_door(cells_of(1.025), cells_of(1.6)),
+        "out of a closet, corridor 1.4 m": out_of_door(cells_of(1.0), cells_of(1.4)),
     }
     return found if quick else found | more
 
@@ -142,9 +145,8 @@ def trimmed(passage: Passage, motions: Motions, rng: np.random.Generator, tries:
         rng: draws what is taken off.
         tries: pieces that are tried.
     """
-    body = motions.body
-    assert body is not None, "robot and cart take room"
-    quickest = solve(passage, motions)
+    body, quickest = motions.body, solve(passage, motions)
+    assert body is not None and quickest is not None and quickest.found, "in each scene there is a plan"
     free, best = ~passage.occupied, quickest.poses
     area = least = first = swept_area(body, best)
     covered = cells_swept(passage, body, best)
