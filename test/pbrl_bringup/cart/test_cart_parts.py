@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 
 from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
-from pbrl_bringup.cart_run import AHEAD, onward
+from pbrl_bringup.cart_run import AHEAD, RETRY, RETRY_MOST, CartRun, onward, rest
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments.cart_kept import keep_leg, read_leg
 from pbrl_bringup.experiments.cart_office import route, rows_of
+from pbrl_control.cart import CartBody, CartCommand, Cause, DriveStatus
 from pbrl_control.cart.whereabouts import Whereabouts
 from pbrl_control.planar import compose, inverse, wrap
 from pbrl_planner.cart.navigator import Answer, Navigator, PlannerCall, free_start, grid_of, with_room
 from pbrl_planner.cart.outline import ARTICULATION, GRIP, frame_at_grip, motions, pr2_with
 from pbrl_planner.cart.shoulders import BEYOND, with_shoulders
-from pbrl_planner.costmap import LETHAL, CostField, StaticMap
-from pbrl_planner.lattice import Lattice, LatticeProblem, LatticeSettings, plan
+from pbrl_planner.costmap import LETHAL, CostField, Recovery, StaticMap
+from pbrl_planner.lattice import Lattice, LatticePlan, LatticeProblem, LatticeSettings, plan
 
 
 @pytest.fixture
@@ -168,7 +169,7 @@ def call(answer: Answer, epsilon: float | None = 1.0) -> PlannerCall:
 
 
 def leg(*calls: PlannerCall, contacts: tuple[Touch, ...] = ()) -> CartOutcome:
-    score = Score(contacts, 0.4, None, (0.01, 0.02), (0.01, 0.0), 0.02, 0.01, 5.0)
+    score = Score(contacts, 0.4, None, (0.01, 0.02), (0.01, 0.0), (1e-3, 2e-3), 0.02, 0.01, 5.0)
     trace = (Trace(0.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "on the way", "", {"a": (1.0, 2.0)}),)
     return CartOutcome(True, "at the goal", 20.0, calls, trace, score, (1.0, 0.0, 0.0), ((0.0, 0.0),), ())
 
@@ -195,3 +196,88 @@ def test_a_kept_leg_comes_back_and_another_is_refused(tmp_path) -> None:
     file.write_text("{}", encoding="utf-8")
     with pytest.raises(BringupError, match="remove it"):
         read_leg(file, told)
+
+
+class Deaf:
+    """Senses that know where everything is, and take note of what they are told to forget."""
+
+    def __init__(self) -> None:
+        self.body, self.stale, self.recovered = CartBody.of(pr2_with(CART)), 0, 0
+
+    def state(self, now: float) -> np.ndarray:
+        return np.array([1.025, 2.025, 0.0, 0.0])
+
+    def floor(self, now: float) -> CostField:
+        return free_field()
+
+    def recover(self, now: float) -> None:
+        self.recovered += 1
+
+    def forget_unseen(self, now: float, age: float) -> list[Recovery]:
+        gone, self.stale = self.stale, 0
+        return [Recovery("", np.zeros((gone, 2)), np.zeros(gone, dtype=int), 0)]
+
+
+def waiting_run(made: list[LatticePlan | None]) -> CartRun:
+    """A run whose planner answers what it is told to."""
+    run = CartRun(None, np.array([3.025, 2.625, 0.0]), motions(1.0, 0.55, True))
+    run.senses = Deaf()
+
+    def answer(now: float, *_: object) -> LatticePlan | None:
+        run.navigator.calls.append(call(Answer.PLAN if made[0] else Answer.NO_PATH))
+        return made.pop(0)
+
+    run.navigator.plan = answer
+    return run
+
+
+def simple_plan() -> LatticePlan:
+    lattice = Lattice(grid_of(free_field()), motions(1.0, 0.55, True))
+    return plan(LatticeProblem(lattice, (1.025, 2.025, 0.0), (3.025, 2.625, 0.0)))
+
+
+def test_where_there_is_no_path_it_waits_longer_and_longer_and_asks_again() -> None:
+    made = simple_plan()
+    run, asked = waiting_run([None, None, None, None, made, None]), []
+    for tick in range(1000):
+        now = 0.05 * tick
+        if now >= run._next_plan and len(asked) < 6:
+            run._set_out(now)
+            asked.append(now)
+    assert np.diff(asked) == pytest.approx([RETRY, 2 * RETRY, RETRY_MOST, RETRY_MOST, RETRY], abs=0.051)
+    assert run._going is not None and run._going.plan is made, "a failure does not end what is driven"
+
+
+def test_where_something_could_be_forgotten_it_asks_again_soon() -> None:
+    run = waiting_run([None, None, None, simple_plan()])
+    run._set_out(0.0)
+    run._set_out(2.0)
+    run.senses.stale = 3
+    run._set_out(6.0)
+    assert run._next_plan == 6.0 + RETRY and run.senses.recovered == 0 and run.senses.stale == 0
+    run._set_out(8.0)
+    assert run._going is not None
+
+
+@pytest.mark.parametrize(("cause", "kept"), [(Cause.OBSTACLE, True), (Cause.FOOTPRINT, True), (Cause.OFF_PLAN, False)])
+def test_a_plan_that_somebody_stands_on_is_waited_on(cause: Cause, kept: bool) -> None:
+    made = simple_plan()
+    run = waiting_run([made])
+    run._set_out(0.0)
+    going, goal = run._going, made.poses[7]
+    nothing = np.zeros(4)
+    command = CartCommand(nothing[:3], 0.0, DriveStatus.REPLAN, cause, "", goal, nothing, 0.0, 0.0)
+    run._heed(8.0, command)
+    assert run.senses.recovered == 1 and (run._going is not None) is kept
+    if kept:
+        assert run._going.plan is made and run._going.controller is not going.controller
+        assert run._going.blocked == 8.0, "a way round is looked for soon"
+
+
+def test_the_rest_of_a_plan_begins_where_it_is_and_ends_where_it_ends() -> None:
+    made = simple_plan()
+    for number in (0, 5, len(made.poses) - 1):
+        turned = made.poses[number] + [0.0, 0.0, 2.0 * math.pi, 0.0]
+        left = rest(made, turned)
+        assert np.array_equal(left[0], turned) and len(left) == len(made.poses) - number
+        assert number == len(made.poses) - 1 or np.array_equal(left[-1], made.poses[-1])

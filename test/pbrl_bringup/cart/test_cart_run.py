@@ -10,7 +10,6 @@ import pytest
 from pbrl_bringup.cart_run import run_cart
 from pbrl_bringup.experiments.cart_office_figure import draw
 from pbrl_planner.cart.navigator import Answer
-from pbrl_planner.cart.outline import POSTURE
 from pr2_cart_sim.maps import FREE, OCCUPIED, GridMap, save_map
 from pr2_cart_sim.scene import OfficeScene
 
@@ -36,7 +35,7 @@ def hall(tmp_path: Path) -> OfficeScene:
         {
             "map": str(tmp_path / "hall.yaml"),
             "room": {"outline": [[-0.1, -0.1], [6.1, -0.1], [6.1, 3.1], [-0.1, 3.1]]},
-            "robot": {"pose": [1.0, 1.5, 0.0], "torso": 0.244, "holds": "cart", "posture": POSTURE},
+            "robot": {"pose": [1.0, 1.5, 0.0], "torso": 0.244, "holds": "cart"},
             "bodies": {"cart": CART},
             "clutter": {"box": box},
             "sensors": {"base_laser": {"increment": 0.0175}, "tilt_laser": {"increment": 0.5, "rate": 0.1}},

@@ -14,12 +14,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
 from pbrl_control.ros.qos import LATCHED
-from pbrl_planner.cart.outline import POSTURE
 from pbrl_planner.costmap import LETHAL, CostField
 from pbrl_planner.ros.cart_controller_node import CartControllerNode
 from pbrl_planner.ros.conversions import path_to_msg, stamp_of
 from pr2_cart_sim.description import BODY_JOINTS, description_path
-from pr2_cart_sim.postures import posture
+from pr2_cart_sim.postures import DEFAULT_POSTURE, posture
 
 Result = FollowCartPath.Result
 
@@ -36,7 +35,7 @@ class Driving:
         self.floor = CostField(np.zeros((120, 240), np.uint8), 0.025, (0.0, 0.0), 0.0)
         self.scans = True
         self.results: list = []
-        stands = posture(POSTURE)
+        stands = posture(DEFAULT_POSTURE)
         self.joints = JointState(
             name=list(BODY_JOINTS), position=[0.244, *stands.head, 0.0, *stands.left, *stands.right]
         )

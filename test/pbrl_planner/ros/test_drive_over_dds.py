@@ -24,7 +24,7 @@ from std_msgs.msg import String
 from pbrl_bringup.graph import free_domain, node_environment
 from pbrl_bringup.paths import node_executable
 from pbrl_control.ros.qos import COMMANDS, LATCHED
-from pbrl_planner.cart.outline import POSTURE, motions
+from pbrl_planner.cart.outline import motions
 from pbrl_planner.ros.cart_controller_node import CartControllerNode
 from pbrl_planner.ros.cart_navigator_node import CartNavigatorNode
 from pbrl_planner.ros.conversions import pose_to_msg
@@ -47,7 +47,7 @@ def hall(tmp_path: Path) -> Path:
     scene = {
         "map": "hall_map.yaml",
         "room": {"outline": [[-0.1, -0.1], [6.1, -0.1], [6.1, 3.1], [-0.1, 3.1]]},
-        "robot": {"pose": [1.0, 1.5, 0.0], "torso": 0.244, "holds": "cart", "posture": POSTURE},
+        "robot": {"pose": [1.0, 1.5, 0.0], "torso": 0.244, "holds": "cart"},
         "bodies": {"cart": cart | {"pose": [2.134, 1.5, 0.0]}},
         "clutter": {"box": box},
         "sensors": {"base_laser": {"increment": 0.0175}, "tilt_laser": {"increment": 0.5, "rate": 0.1}},

@@ -50,6 +50,7 @@ class Score:
         nearest_thing: to anything else, likewise [m].
         position_errors: of the base from the plan's goal of the moment, as the robot has it, a tick [m].
         angle_errors: the greater one of heading and articulation, likewise [rad].
+        tick_seconds: of a core that the local controller took, a tick [s].
         goal_error: of the base to the goal, truly [m].
         goal_angle: likewise [rad].
         way: of the base, truly [m].
@@ -60,6 +61,7 @@ class Score:
     nearest_thing: float | None
     position_errors: tuple[float, ...]
     angle_errors: tuple[float, ...]
+    tick_seconds: tuple[float, ...]
     goal_error: float
     goal_angle: float
     way: float

@@ -18,8 +18,8 @@ from pr2_cart_sim.observations import BaseOdometry, CartReading, KnownMap, Local
 
 LASER = "base_laser_link"
 LOCAL = CostmapSettings()
-WHOLE = CostmapSettings(mark_range=6.0, clear_range=8.0, evidence=EvidenceSettings(memory=120.0))
-"""Of the floor that is planned on: what was seen of it is remembered for longer than a room is left."""
+WHOLE = CostmapSettings(mark_range=6.0, clear_range=8.0, evidence=EvidenceSettings(memory=60.0))
+"""Of the floor that is planned on: what was seen of it is remembered for about as long as a room is left."""
 SIGHT_AGE, MISFIT = 0.25, 0.03
 """As old [s] and as far off [m] a reading of the cart may be before the next source is asked."""
 
@@ -99,6 +99,10 @@ class CartSenses:
         own = self._own(now)
         maps = [each for each in (self.local, self.whole) if each is not None]
         return [step for each in maps for step in (each.clear_inside(own), each.clear_unconfirmed())]
+
+    def forget_unseen(self, now: float, age: float) -> list[Recovery]:
+        """Take out of both costmaps what nobody has seen for so long [s]: who stood there may have walked on."""
+        return [each.clear_unseen(now, age) for each in (self.local, self.whole) if each is not None]
 
     def _own(self, time: float) -> list[Array]:
         """Return outlines of robot and cart in `map` at a time [s]; none where nothing is known of them."""

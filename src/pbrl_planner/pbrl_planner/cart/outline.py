@@ -13,8 +13,6 @@ from pbrl_planner.lattice.body import rectangle
 
 GRIP = (0.65, 0.0)
 """Middle between the hands in `base`, where the cart's bar is [m]."""
-POSTURE = "edge_grasp_low"
-"""Of the simulator's: elbows below the hands; with elbows out the robot is 1.3 m wide and fits through no door."""
 ELBOWS = np.array([[0.0, 0.30], [-0.20, 0.43], [-0.45, 0.43], [-0.45, -0.43], [-0.20, -0.43], [0.0, -0.30]])
 """Around both arms, in the cart's frame at the grip [m]: when it turns, elbows swing out on the other side as if fixed
 to it."""
