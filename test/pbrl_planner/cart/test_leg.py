@@ -11,7 +11,7 @@ from pbrl_planner.cart.leg import ENDED, Drove, Leg, LegState, Order
 from pbrl_planner.cart.query import Outcome
 from pbrl_planner.cart.settings import NavigationSettings
 
-SETTINGS = NavigationSettings(blocked=2.0, retry=2.0, give_up=30.0)
+SETTINGS = NavigationSettings(blocked=2.0, retry=2.0, retry_most=6.0, give_up=30.0)
 
 
 def driving() -> Leg:
@@ -37,14 +37,15 @@ def test_one_question_at_a_time() -> None:
 
 @pytest.mark.parametrize("outcome", [Outcome.NO_PATH, Outcome.GOAL_OCCUPIED, Outcome.UNDECIDED, Outcome.NOT_READY])
 def test_without_a_path_it_is_tried_again_until_patience_is_over(outcome: Outcome) -> None:
-    leg, now, asked = Leg(SETTINGS, 0.0), 0.0, 0
+    leg, now, times = Leg(SETTINGS, 0.0), 0.0, []
     while leg.state not in ENDED:
         if leg.tick(now) is Order.PLAN:
-            asked += 1
             order = leg.planned(now, outcome, "why")
-            assert order is (Order.END if leg.state in ENDED else Order.NOTHING)
+            assert order is (Order.END if leg.state in ENDED else Order.FORGET)
+            times.append(now)
         now += 0.5
-    assert leg.state is LegState.FAILED and leg.sentence == "no path for 32 s; why" and asked == 17 == leg.failures
+    assert leg.state is LegState.FAILED and leg.sentence == "no path for 36 s; why" and leg.failures == len(times)
+    assert np.diff(times).tolist() == [2.0, 4.0, 6.0, 6.0, 6.0, 6.0, 6.0], "less often as it lasts"
 
 
 @pytest.mark.parametrize("outcome", [Outcome.GOAL_OFF_MAP, Outcome.START_OFF_MAP])
@@ -66,7 +67,7 @@ def test_before_something_it_looks_for_a_way_round_and_keeps_the_old_one() -> No
     assert leg.driving(3.0, 1.9, "somebody") is Order.NOTHING and leg.sentence == "somebody"
     assert leg.driving(3.1, 2.0, "somebody") is Order.PLAN
     assert leg.driving(3.2, 2.1, "somebody") is Order.NOTHING
-    assert leg.planned(4.0, Outcome.NO_PATH, "none") is Order.NOTHING and leg.state is LegState.DRIVING
+    assert leg.planned(4.0, Outcome.NO_PATH, "none") is Order.FORGET and leg.state is LegState.DRIVING
     assert leg.driving(5.9, 5.0, "somebody") is Order.NOTHING and leg.driving(6.0, 5.1, "somebody") is Order.PLAN
     assert leg.planned(6.1, Outcome.FOUND, "") is Order.FOLLOW
     assert leg.failures == 1 and leg.plans == 3

@@ -31,12 +31,13 @@ class Play:
     """The navigator, and both servers."""
 
     def __init__(self, stage: Any) -> None:
-        self.stage, self.asked, self.given, self.cancelled, self.cleared = stage, [], [], 0, 0
+        self.stage, self.asked, self.given, self.cancelled, self.cleared, self.forgotten = stage, [], [], 0, 0, 0
         node = stage.node
         self.planner = OneGoal(node, PlanCartPath, "/plan_cart_path", self.asked.append, lambda: None, self._replaced)
         stopped = lambda why: Follow(outcome=Follow.STOPPED, message=why)  # noqa: E731
         self.driver = OneGoal(node, FollowCartPath, "/follow_cart_path", self.given.append, self._cancel, stopped)
         node.create_service(Trigger, "/costmaps/clear", self._clear)
+        node.create_service(Trigger, "/costmaps/forget_unseen", self._forget)
         self.node = stage.add(CartNavigatorNode)
         self.status = stage.hear(String, "/cart_navigator/status", LATCHED)
         stage.tell_time()
@@ -52,6 +53,10 @@ class Play:
     def _clear(self, _: Any, response: Any) -> Any:
         self.cleared += 1
         response.success = True
+        return response
+
+    def _forget(self, _: Any, response: Any) -> Any:
+        self.forgotten += 1
         return response
 
     def until(self, condition: Callable[[], Any]) -> None:
@@ -115,6 +120,7 @@ def test_the_action_tells_how_it_goes_and_how_it_ended(play: Play) -> None:
     play.answer(Plan.NO_PATH, "no path: somebody stands in the door")
     play.says("waiting: no path: somebody stands in the door")
     play.answer(Plan.FOUND, count=2)
+    assert play.forgotten == 1, "what nobody saw of late is not in the second answer"
     play.until(lambda: play.given)
     play.driving(status="on the way", remaining=3.0)
     play.until(lambda: told and told[-1].remaining == 3.0)

@@ -104,6 +104,23 @@ def test_what_was_seen_once_can_be_cleared(mapping: Mapping) -> None:
     assert mapping.look(aside=2.0).cost(x, y + FAR) != LETHAL
 
 
+def test_what_nobody_sees_any_more_can_be_forgotten(mapping: Mapping) -> None:
+    x, y = mapping.stage.pose[:2] + LASER[:2]
+    for _ in range(6):
+        mapping.look()
+    mapping.stage.pose = np.array([1.0, 1.5, np.pi])  # what is behind is not seen
+    for _ in range(60):
+        mapping.stage.tick(0.1)
+    mapping.stage.track(mapping.node.tracker)
+    assert mapping.look(aside=np.inf).cost(x, y + FAR) == LETHAL, "confirmed, it is remembered"
+    client = mapping.stage.node.create_client(Trigger, "/costmaps/forget_unseen")
+    mapping.stage.until(client.service_is_ready)
+    called = client.call_async(Trigger.Request())
+    mapping.stage.until(called.done)
+    assert "nobody has seen for 5 s" in called.result().message
+    assert mapping.look(aside=np.inf).cost(x, y + FAR) != LETHAL
+
+
 def test_nonsense_is_left_aside_and_the_next_scan_counts(mapping: Mapping) -> None:
     strange = scan(mapping.stage.time)
     strange.header.frame_id = "nowhere"

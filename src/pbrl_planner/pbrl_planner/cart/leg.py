@@ -34,6 +34,7 @@ class Order(StrEnum):
     NOTHING = ""
     PLAN = "ask the planner"
     CLEAR = "clear the costmaps where robot and cart are"
+    FORGET = "forget what nobody has seen of late"
     FOLLOW = "drive along the path"
     END = "say how it ended"
 
@@ -64,7 +65,7 @@ class Leg:
         self.state, self.sentence = LegState.PLANNING, "looking for a path"
         self.plans = self.failures = 0
         self._asked = self._driving = False
-        self._next = now
+        self._next, self._pause = now, settings.retry
         self._without: float | None = None
 
     def tick(self, now: float) -> Order:
@@ -79,22 +80,23 @@ class Leg:
         if self.state in ENDED:
             return Order.NOTHING
         self.plans += 1
-        self._next = now + self._settings.retry
         if outcome is Outcome.FOUND:
             self._without, self._driving = None, True
+            self._next, self._pause = now + self._settings.retry, self._settings.retry
             return self._say(LegState.DRIVING, message, Order.FOLLOW)
         self.failures += 1
+        self._next, self._pause = now + self._pause, min(2.0 * self._pause, self._settings.retry_most)
         if outcome in HOPELESS:
             return self._say(LegState.FAILED, message, Order.END)
         if self._driving:
             self.sentence = f"stands before something; {message}"
-            return Order.NOTHING
+            return Order.FORGET
         self._without = now if self._without is None else self._without
         if now - self._without > self._settings.give_up:
             words = f"no path for {now - self._without:.0f} s; {message}"
             return self._say(LegState.FAILED, words, Order.END)
         # What is marked where the robot stands may never have been there; what is there is soon seen again.
-        order = Order.CLEAR if outcome is Outcome.START_OCCUPIED else Order.NOTHING
+        order = Order.CLEAR if outcome is Outcome.START_OCCUPIED else Order.FORGET
         return self._say(LegState.WAITING, message, order)
 
     def driving(self, now: float, blocked: float, reason: str) -> Order:

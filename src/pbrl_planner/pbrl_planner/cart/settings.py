@@ -13,12 +13,16 @@ class NavigationSettings(Section):
 
     Attributes:
         blocked: [s] before something that is in the way after which a way round it is looked for.
-        retry: [s] between two calls of the planner of which the first found nothing.
+        retry: [s] between two calls of the planner of which the first found nothing; twice as long after each more.
+        retry_most: [s] between two calls at most.
+        unseen: [s] after which something that nobody has seen since is taken to be gone, where it leaves no path.
         give_up: [s] without a path after which the goal is given up: people leave, walls do not.
     """
 
     blocked: Positive = 2.0
     retry: Positive = 2.0
+    retry_most: Positive = 6.0
+    unseen: Positive = 5.0
     give_up: Positive = 120.0
 
 

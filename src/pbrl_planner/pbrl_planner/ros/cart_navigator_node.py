@@ -56,11 +56,14 @@ class CartNavigatorNode(Node):
         self._leg: Leg | None = None
         self._number = 0
         self._drive: _Drive | None = None
-        self._clearing = False
+        self._mending = False
         self._epsilon = self._remaining = 0.0
         self._planner = ActionClient(self, PlanCartPath, "/plan_cart_path")
         self._driver = ActionClient(self, FollowCartPath, "/follow_cart_path")
-        self._clear = self.create_client(Trigger, "/costmaps/clear")
+        self._mend = {
+            Order.CLEAR: self.create_client(Trigger, "/costmaps/clear"),
+            Order.FORGET: self.create_client(Trigger, "/costmaps/forget_unseen"),
+        }
         self._goals = OneGoal(
             self,
             NavigateCart,
@@ -127,7 +130,7 @@ class CartNavigatorNode(Node):
         leg = self._leg
         if leg is None or leg.state in ENDED:
             return
-        if not self._clearing:
+        if not self._mending:
             self._do(leg.tick(self._now()))
         self._say(f"{leg.state}: {leg.sentence}")
         feedback = NavigateCart.Feedback(state=str(leg.state), sentence=leg.sentence)
@@ -140,8 +143,8 @@ class CartNavigatorNode(Node):
             self._ask()
         elif order is Order.FOLLOW:
             self._follow(path)
-        elif order is Order.CLEAR:
-            self._clear_costmaps()
+        elif order in self._mend:
+            self._mend_costmaps(order)
         elif order is Order.END:
             self._end()
 
@@ -210,14 +213,14 @@ class CartNavigatorNode(Node):
         result = future.result().result
         self._do(self._leg.drove(ENDS[result.outcome], result.message))
 
-    def _clear_costmaps(self) -> None:
-        if not self._clear.service_is_ready():
-            return
-        self._clearing = True
-        self._clear.call_async(Trigger.Request()).add_done_callback(self._on_cleared)
+    def _mend_costmaps(self, order: Order) -> None:
+        """Have the costmaps' node do what is ordered; nothing is planned before it has, if it is there."""
+        if self._mend[order].service_is_ready():
+            self._mending = True
+            self._mend[order].call_async(Trigger.Request()).add_done_callback(self._on_mended)
 
-    def _on_cleared(self, _: Future) -> None:
-        self._clearing = False
+    def _on_mended(self, _: Future) -> None:
+        self._mending = False
 
     # Small things
 

@@ -3,7 +3,7 @@
 The local costmap lies around the robot and comes with every scan; the global one covers the map and comes at `rate`.
 Both are in `map`, and stamped with the time of the last scan in them: when the laser is silent, they get old, and
 whoever drives by them stops. What lasers see of robot and cart is left out. The service /costmaps/clear takes out what
-is marked where robot and cart are, and what was seen too seldom.
+is marked where robot and cart are, and what was seen too seldom; /costmaps/forget_unseen what nobody has seen of late.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pbrl_control.planar import Array, compose
 from pbrl_control.ros.qos import LATCHED, NEWEST
 from pbrl_planner.cart.shoulders import with_shoulders
 from pbrl_planner.cart.tracker import CartTracker
-from pbrl_planner.costmap import CostField, Costmap, StaticMap
+from pbrl_planner.costmap import CostField, Costmap, Recovery, StaticMap
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.ros.conversions import field_to_msg, map_from_msg, scan_from_msg
 from pbrl_planner.ros.frames import Frames
@@ -56,6 +56,7 @@ class CostmapNode(Node):
         self.create_subscription(OccupancyGrid, "/map", self._on_map, LATCHED)
         self.create_subscription(LaserScan, "/scan", self._on_scan, NEWEST)
         self.create_service(Trigger, "/costmaps/clear", self._clear)
+        self.create_service(Trigger, "/costmaps/forget_unseen", self._forget_unseen)
         self.create_timer(1.0 / rate, self._tell_global)
 
     def _begin_again(self) -> None:
@@ -98,23 +99,35 @@ class CostmapNode(Node):
         """Publish the global costmap; before the first scan it is the map's alone."""
         if self._global is None:
             return
-        clock = self.get_clock().now().nanoseconds * 1e-9
         # Where scans cease, nothing is forgotten: nobody has looked.
-        now = self._global.time if math.isfinite(self._global.time) else clock
+        now = self._global.time if math.isfinite(self._global.time) else self._now()
         self._global_out.publish(field_to_msg(self._field(self._global, now, self.tracker.own(now))))
 
     def _field(self, costs: Costmap, now: float, own: list[Array]) -> CostField:
         return with_shoulders(costs.field(now), self._static, own)
 
     def _clear(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        own = self.tracker.own(self.tracker.now(self.get_clock().now().nanoseconds * 1e-9))
-        maps = [each for each in (self._local, self._global) if each is not None]
-        steps = [step for each in maps for step in (each.clear_inside(own), each.clear_unconfirmed())]
+        own = self.tracker.own(self._now())
+        steps = [step for each in self._maps() for step in (each.clear_inside(own), each.clear_unconfirmed())]
+        return self._told(steps, response)
+
+    def _forget_unseen(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        # Where scans cease, nothing is forgotten: nobody has looked.
+        age = self._settings.navigation.unseen
+        return self._told([each.clear_unseen(each.time, age) for each in self._maps() if each.time > 0.0], response)
+
+    def _told(self, steps: list[Recovery], response: Trigger.Response) -> Trigger.Response:
         words = "; ".join(f"{step.what}: {len(step.places)} cells" for step in steps if len(step.places))
         response.success, response.message = True, words or "there was nothing to clear"
         self.get_logger().info(response.message)
         self._tell_global()
         return response
+
+    def _maps(self) -> list[Costmap]:
+        return [each for each in (self._local, self._global) if each is not None]
+
+    def _now(self) -> float:
+        return self.tracker.now(self.get_clock().now().nanoseconds * 1e-9)
 
 
 def main() -> None:
