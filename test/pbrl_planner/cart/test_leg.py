@@ -73,6 +73,14 @@ def test_before_something_it_looks_for_a_way_round_and_keeps_the_old_one() -> No
     assert leg.failures == 1 and leg.plans == 3
 
 
+def test_a_way_round_what_has_gone_meanwhile_is_not_taken() -> None:
+    leg = driving()
+    assert leg.driving(3.0, 2.0, "somebody") is Order.PLAN and leg.asked
+    leg.driving(4.0, 0.0, "")
+    assert leg.planned(4.1, Outcome.FOUND, "from where it stood") is Order.NOTHING
+    assert leg.state is LegState.DRIVING and not leg.asked
+
+
 def test_a_drive_that_is_given_up_is_planned_again() -> None:
     leg = driving()
     assert leg.drove(Drove.REPLAN, "too far off") is Order.CLEAR and leg.sentence == "too far off"

@@ -33,9 +33,8 @@ class Play:
     def __init__(self, stage: Any) -> None:
         self.stage, self.asked, self.given, self.cancelled, self.cleared, self.forgotten = stage, [], [], 0, 0, 0
         node = stage.node
-        self.planner = OneGoal(node, PlanCartPath, "/plan_cart_path", self.asked.append, lambda: None, self._replaced)
-        stopped = lambda why: Follow(outcome=Follow.STOPPED, message=why)  # noqa: E731
-        self.driver = OneGoal(node, FollowCartPath, "/follow_cart_path", self.given.append, self._cancel, stopped)
+        self.serve_plans()
+        self.serve_drives()
         node.create_service(Trigger, "/costmaps/clear", self._clear)
         node.create_service(Trigger, "/costmaps/forget_unseen", self._forget)
         self.node = stage.add(CartNavigatorNode)
@@ -46,6 +45,10 @@ class Play:
     @staticmethod
     def _replaced(why: str) -> Any:
         return Plan(outcome=Plan.STOPPED, message=why)
+
+    @staticmethod
+    def _stopped(why: str) -> Any:
+        return Follow(outcome=Follow.STOPPED, message=why)
 
     def _cancel(self) -> None:
         self.cancelled += 1
@@ -90,6 +93,14 @@ class Play:
 
     def ended(self, outcome: int, message: str = "") -> None:
         self.driver.end(Follow(outcome=outcome, message=message), outcome == Follow.ARRIVED)
+
+    def serve_plans(self) -> None:
+        node = self.stage.node
+        self.planner = OneGoal(node, PlanCartPath, "/plan_cart_path", self.asked.append, lambda: None, self._replaced)
+
+    def serve_drives(self) -> None:
+        node = self.stage.node
+        self.driver = OneGoal(node, FollowCartPath, "/follow_cart_path", self.given.append, self._cancel, self._stopped)
 
     def close(self) -> None:
         self.planner.destroy()
@@ -205,3 +216,17 @@ def test_without_a_path_for_too_long_it_gives_up(play: Play) -> None:
         play.answer(Plan.UNDECIDED, "neither", count=count)
         play.later(10.0)
     assert not results[0].success and "no path for" in results[0].message and "neither" in results[0].message
+
+
+def test_a_planner_or_controller_that_is_gone_is_named(play: Play) -> None:
+    results = play.stage.ask(NavigateCart, "/navigate_cart", NavigateCart.Goal(goal=goal()))
+    play.until(lambda: play.asked)
+    play.planner.destroy()
+    play.says("is lattice_planner_node running?")
+    play.serve_plans()
+    play.answer(Plan.FOUND, count=2)
+    play.until(lambda: play.given)
+    play.driver.destroy()
+    play.until(lambda: results)
+    play.serve_drives()
+    assert not results[0].success and "is cart_controller_node running?" in results[0].message

@@ -64,7 +64,7 @@ class Leg:
         self.began = now
         self.state, self.sentence = LegState.PLANNING, "looking for a path"
         self.plans = self.failures = 0
-        self._asked = self._driving = False
+        self._asked = self._driving = self._stands = False
         self._next, self._pause = now, settings.retry
         self._without: float | None = None
 
@@ -81,8 +81,10 @@ class Leg:
             return Order.NOTHING
         self.plans += 1
         if outcome is Outcome.FOUND:
-            self._without, self._driving = None, True
             self._next, self._pause = now + self._settings.retry, self._settings.retry
+            if self._driving and not self._stands:  # who was in the way is gone, and the path begins behind the robot
+                return Order.NOTHING
+            self._without, self._driving, self._stands = None, True, False
             return self._say(LegState.DRIVING, message, Order.FOLLOW)
         self.failures += 1
         self._next, self._pause = now + self._pause, min(2.0 * self._pause, self._settings.retry_most)
@@ -103,7 +105,8 @@ class Leg:
         """Take in how the drive goes on: for how long it has stood before something [s], and why it is slow."""
         if self.state is not LegState.DRIVING:
             return Order.NOTHING
-        self.sentence = reason if reason and blocked > 0.0 else "on the way"
+        self._stands = blocked > 0.0
+        self.sentence = reason if reason and self._stands else "on the way"
         if blocked < self._settings.blocked or self._asked or now < self._next:
             return Order.NOTHING
         return self._ask()
@@ -118,6 +121,11 @@ class Leg:
         if ended is Drove.REPLAN:
             return self._say(LegState.WAITING, message, Order.CLEAR)
         return self._say(LegState.FAILED, message or str(ended), Order.END)
+
+    @property
+    def asked(self) -> bool:
+        """Whether the planner has not answered yet."""
+        return self._asked and self.state not in ENDED
 
     def refuse(self, sentence: str) -> None:
         """Fail: it is no goal, or nobody wants it any more."""

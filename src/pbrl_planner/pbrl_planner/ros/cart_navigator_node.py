@@ -29,6 +29,8 @@ from pbrl_planner.ros.saying import Saying
 
 TICK = 0.1
 """[s] of the node's clock."""
+NO_PLANNER = "no action /plan_cart_path; is lattice_planner_node running?"
+NO_CONTROLLER = "no action /follow_cart_path; is cart_controller_node running?"
 ENDS = {getattr(FollowCartPath.Result, each.name): each for each in Drove}
 
 
@@ -130,6 +132,7 @@ class CartNavigatorNode(Node):
         leg = self._leg
         if leg is None or leg.state in ENDED:
             return
+        self._look_after_others(leg)
         if not self._mending:
             self._do(leg.tick(self._now()))
         self._say(f"{leg.state}: {leg.sentence}")
@@ -137,6 +140,17 @@ class CartNavigatorNode(Node):
         feedback.plans, feedback.failures = leg.plans, leg.failures
         feedback.epsilon, feedback.remaining = self._epsilon, self._remaining
         self._goals.tell(feedback)
+
+    def _look_after_others(self, leg: Leg) -> None:
+        """Go on where whoever was to answer is gone: an answer will not come any more."""
+        if leg.asked and not self._planner.server_is_ready():
+            self._number += 1
+            self._do(leg.planned(self._now(), Outcome.NOT_READY, NO_PLANNER))
+        if self._drive is not None and not self._driver.server_is_ready():
+            self._drive = None
+            self._do(leg.drove(Drove.REFUSED, NO_CONTROLLER))
+        if self._mending and not any(each.service_is_ready() for each in self._mend.values()):
+            self._mending = False
 
     def _do(self, order: Order, path: Any = None) -> None:
         if order is Order.PLAN:
@@ -153,8 +167,7 @@ class CartNavigatorNode(Node):
     def _ask(self) -> None:
         assert self._goal is not None and self._leg is not None
         if not self._planner.server_is_ready():
-            words = "no action /plan_cart_path; is lattice_planner_node running?"
-            self._do(self._leg.planned(self._now(), Outcome.NOT_READY, words))
+            self._do(self._leg.planned(self._now(), Outcome.NOT_READY, NO_PLANNER))
             return
         sent = self._planner.send_goal_async(
             PlanCartPath.Goal(goal=self._goal), feedback_callback=partial(self._on_better, self._number)
@@ -181,8 +194,7 @@ class CartNavigatorNode(Node):
     def _follow(self, path: Any) -> None:
         assert self._leg is not None
         if not self._driver.server_is_ready():
-            words = "no action /follow_cart_path; is cart_controller_node running?"
-            self._do(self._leg.drove(Drove.REFUSED, words))
+            self._do(self._leg.drove(Drove.REFUSED, NO_CONTROLLER))
             return
         # Of another path that is driven nothing more is wanted: the controller lets this one take its place.
         drive = self._drive = _Drive()
