@@ -28,7 +28,7 @@ from pbrl_control.ros.qos import LATCHED
 from pbrl_planner.costmap import CostField
 from pbrl_planner.ros.conversions import field_to_msg, pose_to_msg, stamp_of
 
-PATIENCE = 30.0  # [s] of the wall clock
+PATIENCE = 120.0  # [s] of the wall clock
 STREAM = QoSProfile(depth=10)
 CART = [[-0.5, -0.275], [0.5, -0.275], [0.5, 0.275], [-0.5, 0.275]]
 BEFORE = 0.65 + 0.484

@@ -32,7 +32,7 @@ from pbrl_planner.ros.costmap_node import CostmapNode
 from pbrl_planner.ros.lattice_planner_node import LatticePlannerNode
 from pr2_cart_sim.maps import FREE, OCCUPIED, GridMap, save_map
 
-PATIENCE = 120.0  # [s] of the wall clock
+PATIENCE = 200.0  # [s] of the wall clock
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -49,22 +49,24 @@ class Reply:
         outcome: what it came to.
         message: in a sentence.
         plan: where one was found.
+        poses: (n, 4) of it, and before them where robot and cart are, which is not quite where it begins.
     """
 
     outcome: Outcome
     message: str
     plan: LatticePlan | None = None
+    poses: Array = field(default_factory=lambda: np.zeros((0, 4)))
 
 
 def ask(
-    navigator: Navigator, now: float, field: CostField, start: Array, goal: Array, improved: Improved | None = None
+    navigator: Navigator, now: float, floor: CostField, start: Array, goal: Array, improved: Improved | None = None
 ) -> Reply:
     """Plan from a pose (4,) to a pose (3,) of `base` in `map` on a costmap of any resolution.
 
     Args:
         navigator: plans.
         now: [s], for its account.
-        field: the floor.
+        floor: costs of it.
         start: x, y, heading, articulation [m, rad].
         goal: x, y, heading, the cart straight.
         improved: is given each solution as soon as it is there; returns True: it is good enough.
@@ -75,25 +77,30 @@ def ask(
     ):
         if not np.isfinite(pose).all():
             return Reply(outcome, f"{what}: expected finite numbers, got {pose}")
-        fault = off_map(field, pose)
+        fault = off_map(floor, pose)
         if fault:
             return Reply(outcome, f"{what}: {fault}")
     try:
-        made = navigator.plan(now, in_cells_of(navigator.resolution, field), start, goal, improved)
+        made = navigator.plan(now, in_cells_of(navigator.resolution, floor), start, goal, improved)
     except PlannerError as error:
         return Reply(Outcome.UNDECIDED, str(error))
     call = navigator.calls[-1]
     outcome = OUTCOMES[call.answer]
     if made is None:
         return Reply(outcome, f"{call.answer}; {call.reason}" if call.reason else str(call.answer))
-    return Reply(outcome, f"{made.cost / 1000.0:.1f} s at most {made.epsilon:.2f} times the least", made)
+    return Reply(
+        outcome,
+        f"{made.cost / 1000.0:.1f} s at most {made.epsilon:.2f} times the least",
+        made,
+        np.vstack([start, made.poses]),
+    )
 
 
-def off_map(field: CostField, pose: Array) -> str:
+def off_map(floor: CostField, pose: Array) -> str:
     """Return why a pose is not on a costmap, in words; empty where it is."""
-    rows, columns = field.cells.shape
-    low = np.array(field.origin)
-    high = low + field.resolution * np.array([columns, rows])
+    rows, columns = floor.cells.shape
+    low = np.array(floor.origin)
+    high = low + floor.resolution * np.array([columns, rows])
     if (low <= pose[:2]).all() and (pose[:2] < high).all():
         return ""
     return (
@@ -102,13 +109,13 @@ def off_map(field: CostField, pose: Array) -> str:
     )
 
 
-def in_cells_of(resolution: float, field: CostField) -> CostField:
+def in_cells_of(resolution: float, floor: CostField) -> CostField:
     """Return a costmap in cells of another size [m]: a new cell costs what the dearest old one in it does.
 
     Raises:
         PlannerError: there would be too many cells.
     """
-    if math.isclose(resolution, field.resolution, rel_tol=SAME):
-        return field
-    grid = CostGrid(field.cells, field.resolution, field.origin, INSCRIBED, LETHAL).resampled(resolution)
-    return replace(field, cells=grid.cells, resolution=resolution)
+    if math.isclose(resolution, floor.resolution, rel_tol=SAME):
+        return floor
+    grid = CostGrid(floor.cells, floor.resolution, floor.origin, INSCRIBED, LETHAL).resampled(resolution)
+    return replace(floor, cells=grid.cells, resolution=resolution)

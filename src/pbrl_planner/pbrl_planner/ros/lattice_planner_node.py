@@ -37,6 +37,8 @@ from pbrl_planner.ros.markers import swept
 from pbrl_planner.ros.one_goal import OneGoal
 from pbrl_planner.ros.running import declare_settings, run_node
 
+PREPARING = 120.0
+"""[s] that a first plan may take, which has everything compiled on a machine where nothing is yet."""
 LOOKS = 50.0
 """Of the thread's news, a second of the steady clock, while it is planned."""
 
@@ -97,7 +99,7 @@ class LatticePlannerNode(Node):
             self.get_logger().error(f"/global_costmap/costmap is left aside: {error}", throttle_duration_sec=5.0)
         cart = self.tracker.cart
         if cart is not None and self._prepared is None:  # what every plan needs takes seconds: not in the first one
-            self._prepared = self._thread.submit(self._motions, cart)
+            self._prepared = self._thread.submit(self._prepare, cart)
 
     def _want(self, goal: PlanCartPath.Goal) -> None:
         """Plan for a goal, once the thread is done with the one before."""
@@ -138,6 +140,15 @@ class LatticePlannerNode(Node):
             return self._unwanted
 
         return ask(navigator, now, field, begin, aim, improved)
+
+    def _prepare(self, cart: Array) -> None:
+        """Sweep the motions, and have a robot that is nowhere go a little way: what is not compiled yet is then."""
+        moves = self._motions(cart)
+        size = moves.primitives.resolution
+        cells = np.zeros((round(6.0 / size), round(6.0 / size)), np.uint8)
+        floor = CostField(cells, size, (-3.0, -3.0), 0.0)
+        settings = self._settings.planner.model_copy(update={"time_limit": PREPARING})
+        ask(Navigator(moves, settings), 0.0, floor, np.zeros(4), np.array([0.3, 0.0, 0.0]))
 
     def _motions(self, cart: Array) -> Motions:
         length, width = np.ptp(cart, axis=0)
@@ -180,12 +191,12 @@ class LatticePlannerNode(Node):
         result = PlanCartPath.Result(outcome=reply.outcome.value, message=reply.message, seconds=spent)
         if reply.plan is not None:
             now = self.get_clock().now().nanoseconds * 1e-9
-            result.path = path_to_msg(reply.plan.poses, now)
+            result.path = path_to_msg(reply.poses, now)
             result.epsilon, result.cost = float(reply.plan.epsilon), reply.plan.cost / 1000.0
             result.expansions = reply.plan.expansions
             self._plan_out.publish(result.path.path)
             if self.tracker.body is not None:
-                self._markers.publish(swept(self.tracker.body, reply.plan.poses, result.path.path.header.stamp))
+                self._markers.publish(swept(self.tracker.body, reply.poses, result.path.path.header.stamp))
         self.get_logger().info(f"{reply.outcome.name.lower().replace('_', ' ')} after {spent:.2f} s: {reply.message}")
         self._goals.end(result, reply.outcome is Outcome.FOUND)
 
