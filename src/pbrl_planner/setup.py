@@ -5,7 +5,7 @@ NAME = "pbrl_planner"
 setup(
     name=NAME,
     version="0.1.0",
-    description="Planners: kinodynamic RRT of what a robot pushes on learned physics; lattice of a robot with a cart, and its nodes.",
+    description="Planners: kinodynamic RRT on learned physics; lattice of a robot with a cart, and its nodes.",
     license="BSD-3-Clause",
     packages=find_packages(),
     package_data={NAME: ["py.typed"]},
