@@ -28,7 +28,7 @@ from pr2_cart_sim.floor_plan import OfficePlan
 from pr2_cart_sim.make_office import AHEAD, write_office
 from pr2_cart_sim.scene import OfficeScene, load_office
 
-HOUR, QUICK = 3600.0, 120.0
+HOUR, QUICK = 3600.0, 60.0
 """Simulated time that is driven [s]."""
 LEGS = 8
 """In one office."""
@@ -87,7 +87,7 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
 
     Args:
         seed: of offices, people, goals, sensors.
-        quick: two minutes, or a little more until the goal is reached, instead of an hour.
+        quick: one leg instead of an hour.
         out: folder of offices, kept legs and figure.
     """
     wanted, longest = (QUICK, QUICK_LONGEST) if quick else (HOUR, LONGEST)
