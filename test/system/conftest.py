@@ -1,11 +1,15 @@
-"""A place to run a graph in: folder, free domain, and the certainty that nothing is left of it."""
+"""A place to run a graph in: the certainty that nothing is left of it, and somebody who asks it for something."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import psutil
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 def nodes_of_this_test() -> list[psutil.Process]:

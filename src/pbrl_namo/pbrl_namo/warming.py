@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from functools import cache
 
 import numpy as np
@@ -47,6 +48,13 @@ def compile_kernels() -> None:
         find_way(NamoScene.of(room, {}, {}, {}, start, goal), 1)
     except NamoError:
         return
+
+
+def compile_in_background() -> threading.Thread:
+    """Compile in a thread, and return it; while it is alive, Python cannot end in order."""
+    thread = threading.Thread(target=compile_kernels, name="warming", daemon=True)
+    thread.start()
+    return thread
 
 
 def _nothing(begin: float, end: float) -> Recording:

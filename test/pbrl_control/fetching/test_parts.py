@@ -19,7 +19,9 @@ from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.grasping import GraspSettings
 from pbrl_control.kinematics import RobotKinematics
 from pbrl_control.navigation import FloorMap, LocalizerSettings
+from pbrl_control.navigation.floor_map import as_polygon
 from pbrl_control.percept import Grip, Percept, Tag
+from pbrl_control.planar import rotation
 from pbrl_control.types import Hold, PlanarTwist
 from pbrl_model.parameters import BodyParameters
 
@@ -61,6 +63,20 @@ def test_the_map_is_drawn_anew_only_when_something_moves() -> None:
         maps.append(around.floor())
     assert maps[0] is maps[1]
     assert maps[1] is not maps[2]
+
+
+def test_the_map_creeps_with_what_creeps() -> None:
+    """Ways are planned by the poses and driven by this map: where a gap is narrow, both have to agree."""
+    around = Surroundings(0.5)
+    around.told(ROOM, {})
+    for k in range(100):
+        x, yaw = 3e-4 * k, 5e-4 * k
+        turned = np.array([0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)])
+        around.take(Percept(tags={"table": Tag(k / 30.0, np.array([x, 0.0, 0.8]), turned)}, bodies={"table": TABLE}))
+        drawn, pose = around.floor().obstacles["table"], around.pose("table")
+        placed = as_polygon(np.asarray(TABLE.footprint) @ rotation(float(pose[2])).T + pose[:2], "table")
+        assert drawn.hausdorff_distance(placed) < 6e-3
+    assert pose[0] > 0.02
 
 
 def test_what_is_built_in_stays_where_it_was_told() -> None:

@@ -10,20 +10,15 @@ as at real time but for the machine's jitter.
 
 from __future__ import annotations
 
-import signal
-import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-import rclpy
 from pbrl_msgs.srv import GraspObject, ReleaseObject
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
 from bullet_sim.errors import SimError
@@ -206,28 +201,3 @@ def _quality(topic: str, latched: Sequence[str]) -> QoSProfile:
     if topic in latched:
         return LATCHED_QOS
     return PICTURE_QOS if topic.startswith("/camera/") else STREAM_QOS
-
-
-def run_node(name: str, make: Callable[[threading.Event], PacedSimulator]) -> None:
-    """Run a simulator's node; errors at start are one line and exit code 2."""
-    node = None
-    fault = ""
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
-    try:
-        # rclpy's own handlers would shut the context down between a step and its publication.
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        node = make(stop)
-        node.run()
-    except ExternalShutdownException:
-        pass
-    except (SimError, rclpy_implementation.RCLError) as error:  # RCLError: --ros-args that cannot be read
-        fault = " ".join(str(error).split())
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    if fault:
-        print(f"{name}: {fault}", file=sys.stderr)
-        sys.exit(2)

@@ -6,22 +6,18 @@ goes on only while a push does, at `rate` simulated seconds a second.
 
 from __future__ import annotations
 
-import signal
-import sys
 import threading
 import time
 from typing import Any
 
-import rclpy
 from pbrl_msgs.srv import PushObject
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.signals import SignalHandlerOptions
 
 from bullet_sim.errors import SimError
 from bullet_sim.ros.parameters import declare, refuse_unknown
+from bullet_sim.ros.running import run_node
 from bullet_sim.scene import load_scene
 from krang_sim.errors import KrangError
 from krang_sim.hand_session import HandSession, straight_push
@@ -84,6 +80,13 @@ class HandNode(Node):
         if self._stop.wait(max(due - time.monotonic(), 0.0)):
             raise KrangError("the simulator was stopped in the middle of the push")
 
+    def run(self) -> None:
+        """Push when asked, until it is told to stop."""
+        spinner = SingleThreadedExecutor()
+        spinner.add_node(self)
+        while not self._stop.is_set() and self.context.ok():
+            spinner.spin_once(timeout_sec=0.1)
+
     def destroy_node(self) -> None:
         """End Bullet with the node."""
         self._session.close()
@@ -91,31 +94,8 @@ class HandNode(Node):
 
 
 def main() -> None:
-    """Run the node; errors at start are one line and exit code 2."""
-    node = None
-    fault = ""
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
-    try:
-        # rclpy's own handlers would shut the context down between a step and its publication.
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        node = HandNode(stop)
-        spinner = SingleThreadedExecutor()
-        spinner.add_node(node)
-        while not stop.is_set() and node.context.ok():
-            spinner.spin_once(timeout_sec=0.1)
-    except ExternalShutdownException:
-        pass
-    except (SimError, rclpy_implementation.RCLError) as error:  # RCLError: --ros-args that cannot be read
-        fault = " ".join(str(error).split())
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    if fault:
-        print(f"hand_node: {fault}", file=sys.stderr)
-        sys.exit(2)
+    """Run the node."""
+    run_node("hand_node", HandNode)
 
 
 if __name__ == "__main__":

@@ -13,8 +13,9 @@ from typing import get_args
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64MultiArray
 
-from bullet_sim.ros.paced import PacedSimulator, run_node
+from bullet_sim.ros.paced import PacedSimulator
 from bullet_sim.ros.parameters import declare, refuse_unknown
+from bullet_sim.ros.running import run_node
 from bullet_sim.scene import Scene, TagSource, load_scene, with_model, with_tags
 from krang_sim.errors import KrangError
 from krang_sim.messages import message_types

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,9 +30,18 @@ SHOWN = {
 }
 """States that have a picture, and what is written over it."""
 MOST, COLUMNS = 12, 3
+CONCEALED = "#c2185b"
+MOVED = 0.02
+"""[m] and [rad] together from which on a thing is drawn where it was before."""
 
 
-def draw(run: NamoOutcome, out: Path, concealed: Sequence[Array] = (), name: str = FIGURE) -> Path:
+def draw(
+    run: NamoOutcome,
+    out: Path,
+    concealed: Sequence[Array] = (),
+    name: str = FIGURE,
+    braked: Mapping[str, Sequence[Sequence[float]]] = MappingProxyType({}),
+) -> Path:
     """Draw a run into a folder as `figure.png`.
 
     Args:
@@ -38,6 +49,7 @@ def draw(run: NamoOutcome, out: Path, concealed: Sequence[Array] = (), name: str
         out: the folder.
         concealed: (k, 2) corners of what only the simulator knows [m].
         name: of the file, without its ending.
+        braked: (x, y) of the casters of each thing that are locked, in its own frame [m].
     """
     moments = [each for each in run.moments if each.state in SHOWN]
     if len(moments) > MOST:  # the beginning and the end say most
@@ -47,9 +59,14 @@ def draw(run: NamoOutcome, out: Path, concealed: Sequence[Array] = (), name: str
     for k, moment in enumerate(moments):
         axes = figure.add_subplot(rows, COLUMNS, k + 1)
         _picture(axes, moment, k + 1, run)
+        if k:
+            _where_it_was(axes, moments[k - 1], moment, run)
+        for thing, casters in braked.items():
+            x, y = _placed(casters, moment.poses[thing]).T
+            axes.plot(x, y, ls="", marker="o", color=CONCEALED, ms=3.5)
         for shape in concealed:
-            axes.add_patch(Polygon(shape, closed=True, fc="none", ec="#c2185b", lw=1.2, ls="--"))
-    _note(figure, run)
+            axes.add_patch(Polygon(shape, closed=True, fc="none", ec=CONCEALED, lw=1.2, ls="--"))
+    _note(figure, run, bool(concealed or braked))
     return save(figure, out, name)
 
 
@@ -57,8 +74,9 @@ def _picture(axes: Axes, moment: Moment, number: int, run: NamoOutcome) -> None:
     corners = np.array(run.room)
     axes.add_patch(Polygon(corners, closed=True, fc="#fafafa", ec="#444", lw=1.5))
     for k, (name, pose) in enumerate(moment.poses.items()):
-        turned = np.array(run.outlines[name]) @ rotation(pose[2]).T + np.array(pose[:2])
-        axes.add_patch(Polygon(turned, closed=True, fc=COLOURS[k % len(COLOURS)], ec="#333", alpha=0.75))
+        axes.add_patch(
+            Polygon(_placed(run.outlines[name], pose), closed=True, fc=COLOURS[k % len(COLOURS)], ec="#333", alpha=0.75)
+        )
     robot = KRANG_STOWED.at(np.array(moment.base))
     axes.add_patch(Polygon(robot, closed=True, fc="#555", ec="#111"))
     x, y, heading = moment.base
@@ -76,13 +94,26 @@ def _picture(axes: Axes, moment: Moment, number: int, run: NamoOutcome) -> None:
     axes.set_xlabel(_short(moment.sentence), fontsize=7)
 
 
+def _where_it_was(axes: Axes, before: Moment, now: Moment, run: NamoOutcome) -> None:
+    """Draw where a thing stood in the picture before, if it has been moved since."""
+    for name, pose in before.poses.items():
+        if math.dist(pose, now.poses[name]) > MOVED:
+            was = _placed(run.outlines[name], pose)
+            axes.add_patch(Polygon(was, closed=True, fc="none", ec="#888", lw=0.8, ls=":"))
+
+
+def _placed(points: Sequence[Sequence[float]], pose: Sequence[float]) -> Array:
+    return np.asarray(np.array(points) @ rotation(pose[2]).T + np.array(pose[:2]))
+
+
 def _short(sentence: str, most: int = 62) -> str:
     return sentence if len(sentence) <= most else f"{sentence[: most - 3]}..."
 
 
-def _note(figure: Figure, run: NamoOutcome) -> None:
+def _note(figure: Figure, run: NamoOutcome, hidden: bool) -> None:
     planned, updates = run.rows["overall planning time [s]"], run.rows["calls to UpdateModel"]
     figure.suptitle(
-        f"{run.seconds:.0f} s simulated, {planned:.2f} s of planning, {updates:.0f} model updates: {run.sentence}",
+        f"{run.seconds:.0f} s simulated, {planned:.2f} s of planning, {updates:.0f} model updates: {run.sentence}"
+        + ("\n(red: locked casters and what else nobody told the robot; dotted: where it was)" if hidden else ""),
         fontsize=10,
     )

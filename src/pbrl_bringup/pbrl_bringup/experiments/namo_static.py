@@ -12,5 +12,5 @@ THESIS = Told(runtime=288.0, planning=37.0, plans=1, updates=1)
 
 
 def measure(seed: int, quick: bool, out: Path) -> Measured:
-    """Run the experiment: two casters of the square table are locked, drawn anew in each room."""
+    """Run the experiment: three or four casters of the square table are locked, drawn anew in each room."""
     return measured(seed, quick, out, STUCK, THESIS)

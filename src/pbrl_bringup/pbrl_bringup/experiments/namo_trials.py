@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from bullet_sim.catalogue import OfficeTable
+from bullet_sim.scene import Scene
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.experiments.namo_figure import draw
 from pbrl_bringup.experiments.namo_kept import kept_run
@@ -84,8 +86,20 @@ def measured(seed: int, quick: bool, out: Path, layout: Layout, thesis: Told) ->
     """
     count = 1 if quick else RUNS
     runs = in_parallel(trial, [(seed, k, layout, out / RUNS_KEPT) for k in range(count)], "rooms")
-    draw(max(runs, key=lambda run: run.reached + _as_told(run)), out)
+    shown = max(range(count), key=lambda k: runs[k].reached + _as_told(runs[k]))
+    scene, _ = draw_room(np.random.default_rng([seed, shown]), layout)
+    draw(runs[shown], out, braked=braked(scene))
     return Measured(rows_of(runs, thesis), {"runs": [told(run) for run in runs]})
+
+
+def braked(scene: Scene) -> dict[str, list[tuple[float, float]]]:
+    """Return where the locked casters of each table are, in its own frame [m]."""
+    tables = {name: body for name, body in scene.bodies.items() if isinstance(body, OfficeTable)}
+    return {
+        name: [tables[name].swivels[caster] for caster in casters]
+        for name, casters in scene.concealed.locked_casters.items()
+        if name in tables
+    }
 
 
 def rows_of(runs: Sequence[NamoOutcome], thesis: Told) -> list[Row]:

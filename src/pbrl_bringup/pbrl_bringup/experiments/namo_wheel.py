@@ -12,5 +12,5 @@ THESIS = Told(runtime=466.0, planning=52.0, plans=2, updates=2)
 
 
 def measure(seed: int, quick: bool, out: Path) -> Measured:
-    """Run the experiment: two casters of the square table and one of the long one are locked, drawn in each room."""
+    """Run the experiment: three or four casters of the square table and one of the long one are locked."""
     return measured(seed, quick, out, TURNED, THESIS)

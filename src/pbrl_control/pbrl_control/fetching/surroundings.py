@@ -14,7 +14,7 @@ from pbrl_control.planar import Array, wrap
 
 JUMP, JUMP_YAW = 0.05, 0.1  # [m, rad] from where it was: it has moved, nothing to be averaged
 LONGEST_PERIOD = 0.2  # [s] that one sighting stands for at most
-REDRAW, REDRAW_YAW = 0.03, 0.05  # [m, rad] that something moves before the map is drawn anew
+REDRAW, REDRAW_YAW = 0.003, 0.003  # [m, rad] that something moves before the map is drawn anew: gaps are narrow
 
 
 class Surroundings:

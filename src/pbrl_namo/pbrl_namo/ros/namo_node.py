@@ -6,7 +6,8 @@ after the end. It ticks on the node's clock, simulated or not; where that clock 
 after whoever is needed, on a steady clock: while the joint states, the body controller or the grippers' service are
 gone the robot rests, and what is held is let go when they are back.
 
-Plans, grasps and models are thought of in a thread, from all that was heard while something was held.
+Plans, grasps and models are thought of in a thread, from all that was heard while something was held; another one
+compiles ahead what planning calls.
 """
 
 from __future__ import annotations
@@ -58,16 +59,14 @@ from pbrl_namo.ros.liveness import Liveness
 from pbrl_namo.ros.markers import Drawing, draw
 from pbrl_namo.ros.planned import Planned
 from pbrl_namo.thinking import Thoughts
+from pbrl_namo.warming import compile_in_background
 
 GONE = 1.0
 """Silence after which somebody counts as gone [s]."""
-
 LOOKS = 10.0
 """Of whoever is needed, a second of the steady clock."""
-
 TOLD = 0.5
 """Between two messages of status while the state stays the same [s]."""
-
 STUCK_CLOCK = 0.3
 """Without a tick for so long [s of the steady clock], the node's clock stands still: a look is a tick, too."""
 
@@ -107,13 +106,14 @@ class NamoNode(Node):
         self.create_subscription(ObjectModels, "/object_models", self._on_models, LATCHED)
         self._create_outputs()
         self._listener.start()
+        self._warming = compile_in_background()
         self.create_timer(1.0 / rate, self._tick)
         self.create_timer(1.0 / LOOKS, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
     def thinking(self) -> bool:
-        """Whether a job is being answered: its thread cannot be stopped."""
-        return self._planned.busy
+        """Whether a job is being answered or kernels are being compiled: those threads cannot be stopped."""
+        return self._planned.busy or self._warming.is_alive()
 
     def destroy_node(self) -> None:
         """Let listener and thinker go with the node."""
@@ -287,8 +287,7 @@ class NamoNode(Node):
     def _ask(self, request: GripperRequest) -> None:
         client = self._callers[request.action]
         if not client.service_is_ready():
-            sentence = f"no service {client.srv_name}; is the simulator or robot running?"
-            self._answer(GripperAnswer(request.action, request.side, False, sentence))
+            self._no_answer(request, f"no service {client.srv_name}; is the simulator or robot running?")
             return
         if request.action == "grasp":
             call = client.call_async(GraspObject.Request(gripper=request.side, object=request.object))
@@ -299,11 +298,13 @@ class NamoNode(Node):
     def _on_answer(self, request: GripperRequest, call: Future) -> None:
         result = call.result()
         if result is None:
-            sentence = f"the {request.action} service gave no result"
-            self._answer(GripperAnswer(request.action, request.side, False, sentence))
+            self._no_answer(request, f"the {request.action} service gave no result")
             return
         distance = float(getattr(result, "distance", 0.0))
         self._answer(GripperAnswer(request.action, request.side, bool(result.success), str(result.message), distance))
+
+    def _no_answer(self, request: GripperRequest, sentence: str) -> None:
+        self._answer(GripperAnswer(request.action, request.side, False, sentence))
 
     def _answer(self, answer: GripperAnswer) -> None:
         if self._executive is not None:

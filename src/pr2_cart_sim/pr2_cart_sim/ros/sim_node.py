@@ -11,8 +11,9 @@ import threading
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64MultiArray
 
-from bullet_sim.ros.paced import PacedSimulator, run_node
+from bullet_sim.ros.paced import PacedSimulator
 from bullet_sim.ros.parameters import declare, refuse_unknown
+from bullet_sim.ros.running import run_node
 from pr2_cart_sim.errors import Pr2Error
 from pr2_cart_sim.messages import LATCHED, MESSAGE_TYPES
 from pr2_cart_sim.scene import OfficeScene, load_office, with_board
