@@ -71,6 +71,8 @@ class MoveTables:
 
     Attributes:
         primitive: (m,) number of each move's primitive.
+        source: (m,) bins.
+        ahead: (m, 2) columns and rows from source to target.
         into: the moves into each bin, by rank.
     """
 
@@ -83,6 +85,8 @@ class MoveTables:
     primitive: Int
     rank: NDArray[np.uint8]
     target: Int
+    source: Int
+    ahead: Int
     into: tuple[Int, ...]
 
     @classmethod
@@ -116,6 +120,8 @@ class MoveTables:
             _ints([move.primitive for move in ordered]),
             np.array(rank, dtype=np.uint8),
             _ints([move.target for move in ordered]),
+            _ints([move.source for move in ordered]),
+            _ints([(move.dx, move.dy) for move in ordered]),
             tuple(_ints(each) for each in into),
         )
 

@@ -131,12 +131,7 @@ class _Search:
                 self._numbers,
                 min(left, AT_ONCE),
                 lattice.stride,
-                sweeps.shape,
-                sweeps.pieces_first,
-                sweeps.pieces,
-                sweeps.levels,
-                sweeps.free,
-                sweeps.known,
+                sweeps,
             )
             if status == kernel.TOO_COSTLY:
                 raise PlannerError(

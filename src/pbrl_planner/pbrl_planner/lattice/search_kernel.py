@@ -13,11 +13,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_planner.lattice.heap_kernel import heap_pop, heap_push, heapify
-from pbrl_planner.lattice.sweep_kernel import is_free
+from pbrl_planner.lattice.sweep_kernel import SweepTables, is_free
 
 Long = NDArray[np.int64]
 Int = NDArray[np.int32]
-Word = NDArray[np.uint64]
 Byte = NDArray[np.uint8]
 
 LIMIT = 1 << 30
@@ -53,12 +52,7 @@ def improve(
     numbers: Long,
     allowed: int,
     stride: int,
-    shape: Int,
-    pieces_first: Int,
-    pieces: Int,
-    levels: Word,
-    free: Word,
-    known: Byte,
+    sweeps: SweepTables,
 ) -> int:
     """Expand states in the order of g + epsilon h until the goal is next, nothing is left, or `allowed` are expanded.
 
@@ -83,12 +77,7 @@ def improve(
         numbers: (10,) what is carried from call to call; places above.
         allowed: expansions of this call.
         stride: cells of a row of the grid with its border.
-        shape: see `is_free`, as the rest; empty: a point moves.
-        pieces_first: (m + 1,).
-        pieces: (p, 3).
-        levels: of the floor.
-        free: answers.
-        known: which are there.
+        sweeps: see there.
 
     Returns:
         DONE, EXHAUSTED, BUDGET, FULL or TOO_COSTLY.
@@ -101,7 +90,7 @@ def improve(
     for b in range(bins):
         moves_most = max(moves_most, first[b + 1] - first[b])
     full, wait_full = len(heap) - moves_most, len(waiting) - moves_most
-    shaped = len(shape) > 0
+    shaped = sweeps.border >= 0
     expanded = 0
     status = BUDGET
     best = LIMIT - (records[goal] >> 16)
@@ -149,7 +138,7 @@ def improve(
             total = g + unit * (1 + dearest)
             if total >= before or total + ahead >= best:
                 continue
-            if shaped and not is_free(here, m, stride, shape, pieces_first, pieces, levels, free, known):
+            if shaped and not is_free(here, m, stride, sweeps):
                 continue
             if total + ahead >= most:
                 status = TOO_COSTLY
