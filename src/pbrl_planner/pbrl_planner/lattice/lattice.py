@@ -16,7 +16,7 @@ from pbrl_planner.lattice.moves import MoveTables
 from pbrl_planner.lattice.primitives import TURN
 from pbrl_planner.lattice.search_kernel import LIMIT
 from pbrl_planner.lattice.sweep_kernel import SweepTables, close_near
-from pbrl_planner.lattice.sweeps import Floor, point_sweeps, sweeps_of
+from pbrl_planner.lattice.sweeps import Floor, point_sweeps
 
 SAME = 1e-6  # of a resolution, relative, by which two count as one
 MOST_STATES = 1 << 30
@@ -70,12 +70,12 @@ class Lattice:
     def sweeps(self, direction: Direction) -> SweepTables:
         """Return what each move sweeps, and what of that is known to be free."""
         if direction not in self._sweeps:
-            self._sweeps[direction] = point_sweeps() if self.body is None else self._new_sweeps(direction)
+            if self.body is None:
+                self._sweeps[direction] = point_sweeps()
+            else:
+                tables, shape = self.tables(direction), self.cost.shape
+                self._sweeps[direction] = self.motions.sweeps(direction, tables, self._floor, shape)
         return self._sweeps[direction]
-
-    def _new_sweeps(self, direction: Direction) -> SweepTables:
-        cut = self.motions.cut(direction)
-        return sweeps_of(self.motions.shapes.stays, cut, self.tables(direction), self._floor, self.cost.shape)
 
     @cached_property
     def _floor(self) -> Floor:

@@ -14,7 +14,9 @@ from pbrl_planner.lattice.body import ArticulatedBody
 from pbrl_planner.lattice.moves import Move, MoveTables, Relaxed, moves_of, reach_of, relax
 from pbrl_planner.lattice.primitives import TURN, Pace, PrimitiveSet
 from pbrl_planner.lattice.search_kernel import LIMIT
-from pbrl_planner.lattice.sweeps import Cut, Shapes, cut_up
+from pbrl_planner.lattice.shelf import Shelf
+from pbrl_planner.lattice.sweep_kernel import SweepTables
+from pbrl_planner.lattice.sweeps import WORD, Cut, Floor, Shapes, cut_up, joined
 
 DEAREST_MOVE = 1 << 18
 """Cost of a primitive on floor of cost 0 at most, four minutes: the lower bound keeps a bucket for each edge's cost."""
@@ -58,6 +60,8 @@ class Motions:
             )
         self.moves = moves_of(primitives, self.costs, body)
         self._tables: dict[tuple[str, str, int], MoveTables] = {}
+        self.shelf = Shelf()
+        self._pieces: dict[str, tuple[NDArray[np.int32], NDArray[np.int32]]] = {}
         self._outlines: dict[tuple[int, int], dict[str, Cells]] = {}
 
     @cached_property
@@ -91,6 +95,38 @@ class Motions:
     def cut(self, direction: Direction) -> Cut:
         """Return each primitive's sweep, cut up, as seen from where a search comes to it: its start or its end."""
         return self.shapes.forward if direction == "forward" else self.shapes.backward
+
+    def sweeps(self, direction: Direction, moves: MoveTables, floor: Floor, shape: tuple[int, int]) -> SweepTables:
+        """Lay out sweeps for a search on a grid of so many rows and columns, nothing known.
+
+        Args:
+            direction: of the search.
+            moves: of it.
+            floor: its bits.
+            shape: rows and columns of the grid.
+        """
+        if not self._pieces:
+            self._pieces["stays"] = joined(self.shapes.stays)
+        if direction not in self._pieces:
+            cut = self.cut(direction)
+            self._pieces[direction] = joined([cut[number] for number in moves.primitive])
+        rows, words = shape[0], -(-shape[1] // WORD)
+        of_moves, of_bins = (rows, words, len(moves.step)), (rows, words, self.primitives.bins)
+        answers = self.shelf.answers(f"moves {direction}", math.prod(of_moves))
+        standing = self.shelf.answers(f"bins {direction}", math.prod(of_bins))
+        return SweepTables(
+            floor.border,
+            moves.source,
+            moves.target,
+            moves.ahead,
+            *self._pieces[direction],
+            *self._pieces["stays"],
+            floor.levels,
+            *answers.shaped(of_moves),
+            *standing.shaped(of_bins),
+            answers.stamp,
+            standing.stamp,
+        )
 
     @cached_property
     def disc(self) -> NDArray[np.int32]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 Int = NDArray[np.int32]
 Word = NDArray[np.uint64]
 Byte = NDArray[np.uint8]
+Stamp = NDArray[np.uint16]
 Array = NDArray[np.float64]
 ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 NONE = np.uint64(0)
@@ -35,8 +36,9 @@ class SweepTables(NamedTuple):
         stays_first: (bins + 1,) likewise of what all moves from or into a bin cover.
         stays: (s, 3)
         levels: (levels, rows, words) bits of the floor, first cell in the lowest bit.
-        free, known: (grid's rows, words, m) answers of moves, and whether one is there.
+        free, known: (grid's rows, words, m) answers of moves, and whose they are: the floor's that bears the stamp.
         stays_free, stays_known: (grid's rows, words, bins) those of bins.
+        stamp, stays_stamp: of this floor.
     """
 
     border: int
@@ -49,9 +51,11 @@ class SweepTables(NamedTuple):
     stays: Int
     levels: Word
     free: Word
-    known: Byte
+    known: Stamp
     stays_free: Word
-    stays_known: Byte
+    stays_known: Stamp
+    stamp: int
+    stays_stamp: int
 
 
 @njit(cache=True)
@@ -67,9 +71,9 @@ def is_free(here: int, m: int, stride: int, tables: SweepTables) -> bool:
     row = here // stride
     column = here - row * stride
     word = column >> 6
-    if not tables.known[row, word, m]:
+    if tables.known[row, word, m] != tables.stamp:
         tables.free[row, word, m] = move_word(row, word, m, tables)
-        tables.known[row, word, m] = 1
+        tables.known[row, word, m] = tables.stamp
     return (tables.free[row, word, m] >> np.uint64(column & 63)) & np.uint64(1) != 0
 
 
@@ -100,11 +104,11 @@ def move_word(row: int, word: int, m: int, tables: SweepTables) -> np.uint64:
 @njit(cache=True)
 def stay_word(row: int, word: int, b: int, tables: SweepTables) -> np.uint64:
     """Return the bits of where robot and cart may stand in bin `b`, at 64 places side by side."""
-    if not tables.stays_known[row, word, b]:
+    if tables.stays_known[row, word, b] != tables.stays_stamp:
         pieces = tables.stays[tables.stays_first[b] : tables.stays_first[b + 1]]
         taken = taken_word(row + tables.border, (word << 6) + tables.border, pieces, tables.levels, NONE)
         tables.stays_free[row, word, b] = ~taken
-        tables.stays_known[row, word, b] = 1
+        tables.stays_known[row, word, b] = tables.stays_stamp
     return tables.stays_free[row, word, b]
 
 

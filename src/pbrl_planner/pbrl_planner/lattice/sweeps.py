@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_planner.lattice.moves import Move, MoveTables
+from pbrl_planner.lattice.moves import Move
 from pbrl_planner.lattice.sweep_kernel import SweepTables, lay_out
 
 Int = NDArray[np.int32]
@@ -99,44 +99,15 @@ def _framed(mask: Mask, reach: int, dx: int, dy: int) -> Mask:
 
 def point_sweeps() -> SweepTables:
     """Return the tables of a point, which sweeps nothing."""
-    ints, words, bytes_ = np.zeros(0, np.int32), np.zeros((1, 1, 1), np.uint64), np.zeros((1, 1, 1), np.uint8)
+    ints, words, stamps = np.zeros(0, np.int32), np.zeros((1, 1, 1), np.uint64), np.zeros((1, 1, 1), np.uint16)
     none = ints.reshape(0, 3)
     return SweepTables(
-        -1, ints, ints, ints.reshape(0, 2), ints, none, ints, none, words, words, bytes_, words.copy(), bytes_.copy()
+        -1, ints, ints, ints.reshape(0, 2), ints, none, ints, none, words, words, stamps, words, stamps, 1, 1
     )
 
 
-def sweeps_of(stays: Cut, cut: Cut, moves: MoveTables, floor: Floor, shape: tuple[int, int]) -> SweepTables:
-    """Lay out sweeps for a search on a grid, nothing known.
-
-    Args:
-        stays: of each bin.
-        cut: of each primitive, as the search's direction sees it.
-        moves: of the search.
-        floor: its bits.
-        shape: rows and columns of the grid.
-    """
-    pieces_first, pieces = _joined([cut[number] for number in moves.primitive])
-    stays_first, stays_all = _joined(stays)
-    rows, words = shape[0], -(-shape[1] // WORD)
-    return SweepTables(
-        floor.border,
-        moves.source,
-        moves.target,
-        moves.ahead,
-        pieces_first,
-        pieces,
-        stays_first,
-        stays_all,
-        floor.levels,
-        np.zeros((rows, words, len(moves.step)), dtype=np.uint64),
-        np.zeros((rows, words, len(moves.step)), dtype=np.uint8),
-        np.zeros((rows, words, len(stays)), dtype=np.uint64),
-        np.zeros((rows, words, len(stays)), dtype=np.uint8),
-    )
-
-
-def _joined(cut: Cut) -> tuple[Int, Int]:
+def joined(cut: Cut) -> tuple[Int, Int]:
+    """Return where each set's pieces begin (n + 1,), and all pieces (p, 3)."""
     first = np.concatenate(([0], np.cumsum([len(each) for each in cut]))).astype(np.int32)
     return first, np.ascontiguousarray(np.concatenate(cut), dtype=np.int32)
 
