@@ -15,6 +15,7 @@ from pbrl_planner.lattice import search_kernel as kernel
 from pbrl_planner.lattice.lower_bound import LowerBound
 from pbrl_planner.lattice.plan import Improvement, LatticePlan
 from pbrl_planner.lattice.problem import LatticeProblem
+from pbrl_planner.lattice.reach import Reached, reach
 from pbrl_planner.lattice.settings import LatticeSettings
 
 AT_ONCE = 20_000
@@ -73,6 +74,7 @@ class _Search:
         self._best: tuple[int, NDArray[np.int64]] | None = None
         self._epsilon, self._least = math.inf, 1
         self._bins = lattice.primitives.bins
+        self._any: Reached | None = None
         self._bound = LowerBound(lattice, self._goal, settings.direction)
         self._bound.reach(self._root, FURTHER)
         self._radius = self._bound.radius
@@ -105,6 +107,8 @@ class _Search:
         while True:
             status = self._round()
             if self._thin and status != kernel.DONE:
+                if self._any is None and self._look_for_any():
+                    return self._result(self._best is None, self._reason())
                 place = self._scout_closer(numerators[0])
                 continue
             if status == kernel.BUDGET:
@@ -123,6 +127,22 @@ class _Search:
         blocks = ((rows >> thin) + 1) * ((columns >> thin) + 1) if thin else 0
         self._thin, self._marks = thin, np.zeros((blocks, self._bins), dtype=np.uint8)
         self._most = min(self._settings.expansions, int(self._numbers[kernel.EXPANDED]) + SCOUTED)
+
+    def _look_for_any(self) -> bool:
+        """Find out whether there is any way at all; return whether that, or the way itself, is answer enough."""
+        ends = self._root, self._goal
+        start, goal = ends if self._settings.direction == "forward" else ends[::-1]
+        self._any = reach(self._lattice, start, goal, self._settings.time_limit - self._elapsed())
+        if self._any.primitives is None:
+            return self._any.connected is False
+        cost = self._lattice.cost_along(self._problem.start_state, self._any.primitives)
+        self._best = (cost, self._any.primitives)
+        self._epsilon = cost / max(1, self._bound.at(self._root))
+        return self._tell()
+
+    def _reason(self) -> str:
+        assert self._any is not None, "called after that was found out"
+        return f"everything that can be reached from the {self._any.side} was looked at" if self._any.side else ""
 
     def _scout_closer(self, numerator: int) -> int:
         """Go over to smaller blocks, or to a search that leaves nothing out; return the place of its epsilon."""
@@ -193,15 +213,16 @@ class _Search:
     def _next(self, numerators: list[int], place: int) -> int:
         """Note the plan, prove its bound, and make ready for the next epsilon that is below it; return its place."""
         moves, cost = self._way()
-        self._best = (cost, moves)
+        if self._best is None or cost < self._best[0]:
+            self._best = (cost, moves)
         # What is ahead of the goal on its way may have got cheaper since the goal was reached from there.
         self._records[self._goal] = self._record(cost, int(self._records[self._goal]) & 0xFFFF)
         while True:
             place += 1
             numerator = numerators[min(place, len(numerators) - 1)]
             least = self._merge(numerator)
-            self._least = max(1, self._least, min(least, cost))
-            proved = max(1.0, cost / self._least)
+            self._least = max(1, self._least, min(least, self._best[0]))
+            proved = max(1.0, self._best[0] / self._least)
             # A round that left states out promises nothing by itself.
             asked = numerators[place - 1] / self._settings.denominator if place > 0 else math.inf
             self._epsilon = min(self._epsilon, proved, asked)
@@ -266,6 +287,8 @@ class _Search:
             spent = int(self._numbers[kernel.EXPANDED]) >= settings.expansions
             effort = f"with {settings.expansions} expansions" if spent else f"in {settings.time_limit:g} s"
             return self._result(False, f"no plan found {effort}; there may be one: allow more")
+        if int(self._records[self._goal]) >> kernel.STAMP != self._taken.stamp:
+            return self._result(False, "")
         moves, cost = self._way()
         if cost < self._best[0]:
             self._best = (cost, moves)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -127,3 +127,12 @@ def cut_up(mask: Mask, dx: int = 0, dy: int = 0) -> Int:
     one = np.stack((row, left, level), axis=1)
     two = np.stack((row, left + lengths - (1 << level), level), axis=1)
     return np.concatenate((one, two[lengths != 1 << level])).astype(np.int32)
+
+
+def cut_cells(cells: Collection[tuple[int, int]]) -> Int:
+    """Return cells (x, y), relative to one of them, as pieces (p, 3); see `cut_up`."""
+    reach = max(max(abs(x), abs(y)) for x, y in cells)
+    mask = np.zeros((2 * reach + 1, 2 * reach + 1), dtype=bool)
+    for x, y in cells:
+        mask[y + reach, x + reach] = True
+    return cut_up(mask)
