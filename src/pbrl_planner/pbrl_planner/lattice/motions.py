@@ -164,6 +164,8 @@ class Motions:
         if key not in self._outlines:
             turned = math.remainder(heading * TURN / self.primitives.headings, TURN)
             pose = np.array([[0.0, 0.0, turned, self.primitives.articulations[articulation]]])
-            masks = {part: self.body.mask(pose, self.primitives.resolution, (part,)) for part in self.body.outlines(pose)}
+            masks = {
+                part: self.body.mask(pose, self.primitives.resolution, (part,)) for part in self.body.outlines(pose)
+            }
             self._outlines[key] = {part: np.array(np.nonzero(mask)) - len(mask) // 2 for part, mask in masks.items()}
         return self._outlines[key]

@@ -79,14 +79,16 @@ class _Flood:
         self.seen = np.zeros((rows, self._words, self._bins), dtype=np.uint64)
         self._fresh = np.zeros_like(self.seen)
         self._queue = np.empty(self.seen.size, dtype=np.int32)
-        self._log = [np.empty(ROOM, dtype=kind) for kind in (np.int32, np.int32, np.uint64)]
+        self._log_place: NDArray[np.int32] = np.empty(ROOM, dtype=np.int32)
+        self._log_move: NDArray[np.int32] = np.empty(ROOM, dtype=np.int32)
+        self._log_bits: NDArray[np.uint64] = np.empty(ROOM, dtype=np.uint64)
         self._numbers = np.zeros(3, dtype=np.int64)
         moves = lattice.motions.moves
         cells = []
         for number in self._tables.primitive:
             move = moves[number] if direction == "forward" else moves[number].reverse()
             cells.append(cut_cells({(0, 0), (move.dx, move.dy), *move.dear}))
-        self._crossed = joined(cells)
+        self._crossed_first, self._crossed = joined(cells)
         cell, bin_ = divmod(root, self._bins)
         row, column = divmod(cell, lattice.stride)
         place = (row * self._words + column // WORD) * self._bins + bin_
@@ -104,24 +106,29 @@ class _Flood:
                 tables.ahead,
                 tables.target,
                 self._closed.border,
-                *self._crossed,
+                self._crossed_first,
+                self._crossed,
                 self._closed.levels,
                 self._sweeps,
                 self.seen,
                 self._fresh,
                 self._queue,
-                *self._log,
+                self._log_place,
+                self._log_move,
+                self._log_bits,
                 self._numbers,
                 AT_ONCE,
             )
             if status != kernel.FULL:
                 return bool(status == kernel.EXHAUSTED)
-            self._log = [np.concatenate((each, np.empty_like(each))) for each in self._log]
+            self._log_place = np.concatenate((self._log_place, np.empty_like(self._log_place)))
+            self._log_move = np.concatenate((self._log_move, np.empty_like(self._log_move)))
+            self._log_bits = np.concatenate((self._log_bits, np.empty_like(self._log_bits)))
 
     def way(self, place: int, bit: int) -> NDArray[np.int64]:
         """Return the primitives (k,) by which a state was reached, the last first."""
         count = int(self._numbers[kernel.LOGGED])
-        places, moves, bits = (each[:count] for each in self._log)
+        places, moves, bits = self._log_place[:count], self._log_move[:count], self._log_bits[:count]
         order = np.argsort(places, kind="stable")
         ordered, found = places[order], []
         while (place, bit) != self._root:

@@ -23,7 +23,7 @@ Long = NDArray[np.int64]
 Word = NDArray[np.uint64]
 
 EXHAUSTED, BUDGET, FULL = range(3)
-"""Why a call returned: there is nothing left to go on from, the words that were allowed are done, the log needs room."""
+"""Why a call returned: nothing is left to go on from, the words that were allowed are done, the log needs room."""
 (HEAD, WAITING, LOGGED) = range(3)
 """Places in `numbers`: the queue's first entry, entries in it, entries of the log."""
 

@@ -1,9 +1,10 @@
 """Compiled: one round of ARA* (Likhachev et al.; thesis 4.5.4) over a lattice in flat arrays, to be gone on with.
 
 States are numbered cell * bins + bin, on a grid with a border of blocked cells, so that a move is one addition and no
-move needs a test of the map's edge. A state's record is one number, LIMIT - g in its middle bits and the search's stamp
-in its upper ones: what bears another stamp was never seen, so that large arrays are used again without being cleared. Keys are `denominator * g + numerator * h`, whole
-numbers, so that the bound of epsilon = numerator / denominator holds to the last unit of cost.
+move needs a test of the map's edge. A state's record is one number, LIMIT - g in its middle bits and the search's
+stamp in its upper ones: what bears another stamp was never seen, so that large arrays are used again without being
+cleared. Keys are `denominator * g + numerator * h`, whole numbers, so that the bound of epsilon = numerator /
+denominator holds to the last unit of cost.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ DONE, EXHAUSTED, BUDGET, FULL, TOO_COSTLY = range(5)
 allowed are used up, the heap or the list of inconsistent states needs room, a cost has become too large."""
 (HEAP, WAITING, EXPANDED, GOAL, NUMERATOR, DENOMINATOR, SHIFT, ROUND, MOST, TOUCHED, BEARS) = range(11)
 """Places in `numbers`: entries in the heap, inconsistent states, expansions so far, the goal's state, epsilon as a
-fraction, bits of a state in an entry, which round this is (1 to 127), what g + h has to stay below, states seen, this search's stamp."""
+fraction, bits of a state in an entry, which round this is (1 to 127), what g + h has to stay below, states seen, this
+search's stamp."""
 STAMP, LAST_STAMP = 47, (1 << 16) - 1
 """The lowest bit of a record's stamp, and the largest stamp."""
 COST = (1 << 31) - 1
@@ -152,7 +154,7 @@ def improve(
             dearest = max(source, np.int64(cost[end]))
             if dearest >= blocked:
                 continue
-            ahead = min(np.int64(toward[end]), radius) + np.int64(turning[target[m]])
+            ahead = min(np.int64(toward[end]), np.int64(radius)) + np.int64(turning[target[m]])
             if ahead >= LIMIT:
                 continue
             there = state + step[m]
@@ -208,7 +210,7 @@ def next_round(
     numbers: Long,
     numerator: int,
 ) -> int:
-    """Make one heap of the open and the inconsistent states, for another epsilon, and with `radius` instead of `before`.
+    """Make one heap of the open and the inconsistent states, for another epsilon, with `radius` instead of `before`.
 
     Along a cheapest way the first state of that heap has been reached at its least cost, so that the least g + h in it
     is a lower bound of the cheapest plan's cost: it is returned; LIMIT where nothing is left that could improve.
@@ -231,9 +233,9 @@ def next_round(
             continue
         g = LIMIT - ((record >> 16) & COST)
         floor, turn = np.int64(toward[state // bins]), np.int64(turning[state % bins])
-        if entry >> shift != denominator * g + old * (min(floor, before) + turn):
+        if entry >> shift != denominator * g + old * (min(floor, np.int64(before)) + turn):
             continue
-        h = min(floor, radius) + turn
+        h = min(floor, np.int64(radius)) + turn
         if g + h >= best:
             continue
         heap[count] = ((denominator * g + numerator * h) << shift) | state
@@ -243,7 +245,7 @@ def next_round(
         state = waiting[k]
         records[state] &= ~np.int64(WAITS)
         g = LIMIT - ((records[state] >> 16) & COST)
-        h = min(np.int64(toward[state // bins]), radius) + np.int64(turning[state % bins])
+        h = min(np.int64(toward[state // bins]), np.int64(radius)) + np.int64(turning[state % bins])
         if g + h >= best:
             continue
         heap[count] = ((denominator * g + numerator * h) << shift) | state

@@ -1,4 +1,4 @@
-"""Large arrays of searches, kept for the next one: what the system has to clear first takes longer than a short search."""
+"""Large arrays of searches, kept for the next: clearing them takes longer than a short search."""
 
 from __future__ import annotations
 
