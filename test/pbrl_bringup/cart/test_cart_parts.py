@@ -16,11 +16,11 @@ from pbrl_bringup.experiments.cart_office import route, rows_of
 from pbrl_control.cart import CartBody, CartCommand, Cause, DriveStatus
 from pbrl_control.cart.whereabouts import Whereabouts
 from pbrl_control.planar import compose, inverse, wrap
-from pbrl_planner.cart.navigator import Answer, Navigator, PlannerCall, free_start, grid_of, with_room
+from pbrl_planner.cart.navigator import PATIENCE, Answer, Navigator, PlannerCall, free_start, grid_of, with_room
 from pbrl_planner.cart.outline import ARTICULATION, GRIP, frame_at_grip, motions, pr2_with
 from pbrl_planner.cart.shoulders import BEYOND, with_shoulders
 from pbrl_planner.costmap import LETHAL, CostField, Recovery, StaticMap
-from pbrl_planner.lattice import Lattice, LatticePlan, LatticeProblem, LatticeSettings, plan
+from pbrl_planner.lattice import Lattice, LatticePlan, LatticeProblem, plan
 
 
 @pytest.fixture
@@ -144,12 +144,12 @@ def test_a_robot_that_is_shut_in_is_proved_to_be_from_where_it_stands() -> None:
     field.cells[20:70, 20], field.cells[20:70, 80] = LETHAL, LETHAL
     field.cells[20, 20:81], field.cells[70, 20:80] = LETHAL, LETHAL
     field.cells[40:57, 80] = 0  # a door that its middle fits through, but not all of it
-    few = Navigator(motions(1.0, 0.55, True), LatticeSettings(expansions=30_000))
+    few = Navigator(motions(1.0, 0.55, True), PATIENCE.model_copy(update={"expansions": 2_000}))
     assert few.plan(0.0, field, np.array([2.0, 2.2, 0.0, 0.0]), np.array([7.0, 6.0, 0.0])) is None
     (made,) = few.calls
     assert made.answer is Answer.NO_PATH and made.epsilon is None and not made.found
-    assert made.expansions > 30_000, "from the goal it was not proved"
-    free = Navigator(motions(1.0, 0.55, True), LatticeSettings())
+    assert made.expansions <= 2_000, "no search in the order of cost would prove it with so few"
+    free = Navigator(motions(1.0, 0.55, True))
     assert free.plan(0.0, free_field(160, 200), np.array([2.0, 2.2, 0.0, 0.0]), np.array([7.0, 6.0, 0.0])) is not None
     assert free.calls[0].epsilon == 1.0 and free.calls[0].expansions_first > 0
 
