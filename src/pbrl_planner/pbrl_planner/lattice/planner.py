@@ -27,6 +27,8 @@ NEAR = 12
 """Cells from where the search goes to within which no state is left out."""
 SCOUTED = 15_000
 """Expansions of a search that leaves states out, at most, before it leaves out fewer."""
+SMALL = 2
+"""Of blocks: 4 cells. Only where a search that leaves out so few fails, too, it is asked whether there is any way."""
 ROOM = 1 << 14
 """Entries of the heap to begin with."""
 
@@ -107,7 +109,7 @@ class _Search:
         while True:
             status = self._round()
             if self._thin and status != kernel.DONE:
-                if self._any is None and self._look_for_any():
+                if self._any is None and self._thin <= SMALL and self._look_for_any():
                     return self._result(self._best is None, self._reason())
                 place = self._scout_closer(numerators[0])
                 continue
