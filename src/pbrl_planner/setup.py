@@ -5,7 +5,7 @@ NAME = "pbrl_planner"
 setup(
     name=NAME,
     version="0.1.0",
-    description="Planners: kinodynamic RRT of what a robot pushes on learned physics; lattice of a robot with a cart.",
+    description="Planners: kinodynamic RRT on learned physics; lattice of a robot with a cart, and its nodes.",
     license="BSD-3-Clause",
     packages=find_packages(),
     package_data={NAME: ["py.typed"]},
@@ -15,4 +15,12 @@ setup(
     ],
     install_requires=["numba", "numpy", "ompl", "opencv-python-headless", "pydantic", "scipy", "shapely"],
     zip_safe=False,
+    entry_points={
+        "console_scripts": [
+            "costmap_node = pbrl_planner.ros.costmap_node:main",
+            "lattice_planner_node = pbrl_planner.ros.lattice_planner_node:main",
+            "cart_controller_node = pbrl_planner.ros.cart_controller_node:main",
+            "cart_navigator_node = pbrl_planner.ros.cart_navigator_node:main",
+        ],
+    },
 )

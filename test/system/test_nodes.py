@@ -23,6 +23,10 @@ NODES = [
     ("pbrl_model", "model_node"),
     ("pbrl_model", "tag_detector_node"),
     ("pbrl_mismatch", "mismatch_node"),
+    ("pbrl_planner", "costmap_node"),
+    ("pbrl_planner", "lattice_planner_node"),
+    ("pbrl_planner", "cart_controller_node"),
+    ("pbrl_planner", "cart_navigator_node"),
     ("pbrl_namo", "namo_node"),
 ]
 
@@ -67,6 +71,8 @@ def test_every_package_is_in_the_index(package: str) -> None:
         ("pbrl_model", "model_node", 'priors:="nowhere.yaml"', "nowhere.yaml"),
         ("pbrl_mismatch", "mismatch_node", "without:=['carpet']", "carpet"),
         ("pbrl_namo", "namo_node", 'goal:="over there"', "x y theta"),
+        ("pbrl_planner", "costmap_node", "rate:=50.0", "0.1 to 20"),
+        ("pbrl_planner", "cart_controller_node", 'settings:="nowhere.yaml"', "nowhere.yaml"),
         ("pbrl_bag", "player_node", 'bag:="nowhere"', "nowhere"),
     ],
 )

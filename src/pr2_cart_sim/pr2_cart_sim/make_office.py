@@ -22,6 +22,7 @@ from bullet_sim.settings import parse_settings
 from pr2_cart_sim.errors import Pr2Error
 from pr2_cart_sim.floor_plan import FloorPlan, OfficePlan, RoomPlan, draw_map, draw_plan
 from pr2_cart_sim.maps import GridMap, save_map
+from pr2_cart_sim.postures import DEFAULT_POSTURE
 
 Array = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ def make_office(plan: OfficePlan, seed: int) -> tuple[GridMap, dict[str, Any]]:
     goals["corridor_end"] = [floor.corridor[2] - 2.4, start[1], 0.0]
     scene = {
         "room": {"outline": _rounded(grid.outline)},
-        "robot": {"pose": _rounded(start), "torso": TORSO, "holds": "cart"},
+        "robot": {"pose": _rounded(start), "torso": TORSO, "posture": DEFAULT_POSTURE, "holds": "cart"},
         "bodies": {"cart": CART | {"pose": _rounded([start[0] + AHEAD, *start[1:]])}},
         "goals": {name: _rounded(pose) for name, pose in goals.items()},
         "clutter": _furnish(plan, floor, rng),

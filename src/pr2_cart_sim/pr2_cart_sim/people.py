@@ -198,15 +198,16 @@ class Crowd:
         }
         self._chance = dict(zip(people, streams, strict=True))
 
-    def move(self, near: Mapping[str, Nearness], lead: Lead) -> None:
+    def move(self, near: Mapping[str, Nearness], lead: Lead | None) -> None:
         """Let everybody live for one tick.
 
         Args:
             near: how near robot or cart is to those who are near, by name.
-            lead: what goes ahead of the robot.
+            lead: what goes ahead of the robot; None: nobody steps in front of it.
         """
         for name, walker in self.walkers.items():
-            self._tempt(walker, self._chance[name], lead)
+            if lead is not None:
+                self._tempt(walker, self._chance[name], lead)
             walker.move(near.get(name))
 
     def _tempt(self, walker: Walker, rng: Generator, lead: Lead) -> None:

@@ -43,7 +43,7 @@ def _both(torso: float, left: Angles) -> Posture:
     return Posture(torso, left, mirrored(left))
 
 
-DEFAULT_POSTURE = "edge_grasp"
+DEFAULT_POSTURE = "edge_grasp_low"
 """Fingers above and below the handle of a cart, level, 0.5 m apart, at x 0.65 m and z 0.64 m over the torso's zero."""
 
 POSTURES: Mapping[str, Posture] = MappingProxyType(

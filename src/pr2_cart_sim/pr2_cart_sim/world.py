@@ -66,6 +66,9 @@ class Office:
         mark_robot(client)
         self._check_start()
         self.cart = scene.robot.holds or next((name for name, body in scene.bodies.items() if _is_cart(body)), None)
+        self._cart_reach = 0.0
+        if self.cart is not None:
+            self._cart_reach = float(np.abs(self.world.find(self.cart).settings.footprint).max())
         margin = scene.manners.margin
         taken = [(*scene.robot.pose[:2], 0.9 + margin)]
         if self.cart is not None:
@@ -102,19 +105,23 @@ class Office:
         pose, rates = self.robot.base_state()
         places = {name: (float(each.place[0]), float(each.place[1])) for name, each in self.crowd.walkers.items()}
         near = self.proximity.near_people(places, (float(pose[0]), float(pose[1])))
-        self.crowd.move(near, self._lead(pose, rates))
+        self.crowd.move(near, self._lead(pose, rates) if self._scene.manners.step_in_rate > 0 else None)
 
     def _lead(self, pose: Array, rates: Array) -> Lead:
         """Give what goes ahead of the robot: it, or its cart."""
-        speed = math.hypot(rates[0], rates[1])
-        ahead = rates[:2] / speed if speed > 1e-6 else np.array([math.cos(pose[2]), math.sin(pose[2])])
-        point = pose[:2] + 0.4 * ahead
+        x, y, heading = pose.tolist()
+        vx, vy, _ = rates.tolist()
+        speed = math.hypot(vx, vy)
+        cos, sin = (vx / speed, vy / speed) if speed > 1e-6 else (math.cos(heading), math.sin(heading))
+        reach = 0.4
         if self.cart is not None:
-            body = self.world.find(self.cart)
-            off = body.pose().position[:2] - pose[:2]
-            if off @ ahead > 0 and np.hypot(*off) < 2.0:
-                point = pose[:2] + (off @ ahead + float(np.abs(body.settings.footprint).max())) * ahead
-        return Lead(point, ahead, speed)
+            place = self.world.pose(self.cart).position
+            off = float(place[0]) - x, float(place[1]) - y
+            ahead = off[0] * cos + off[1] * sin
+            if ahead > 0 and math.hypot(*off) < 2.0:
+                reach = ahead + self._cart_reach
+        direction = np.array([cos, sin])
+        return Lead(np.array([x, y]) + reach * direction, direction, speed)
 
 
 def _is_cart(body: object) -> bool:

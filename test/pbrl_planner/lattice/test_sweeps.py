@@ -79,10 +79,7 @@ def test_the_look_up_says_of_every_cell_what_the_mask_does() -> None:
             for y in range(rows):
                 for x in range(columns):
                     cell = (y + lattice.border) * lattice.stride + x + lattice.border
-                    found = is_free(
-                        cell, m, lattice.stride, sweeps.shape, sweeps.pieces_first, sweeps.pieces, sweeps.levels,
-                        sweeps.free, sweeps.known,
-                    )  # fmt: skip
+                    found = is_free(cell, m, lattice.stride, sweeps)
                     assert found == (not taken[covered[:, 0] + y, covered[:, 1] + x].any())
 
 

@@ -20,6 +20,9 @@ EXPERIMENTS = {
     "namo-wheel": "section 6.5.2: a locked caster is learned, the table turned about it",
     "namo-concealed": "a carpet, a tether or an unseen body in the way: who asks what was met, and who does not",
     "namo-scaling": "figures 34 and 35: time to plan among 5 to 80 movable obstacles",
+    "cart-office": "section 4.6 and table 1: the PR2 pushes a cart through offices with people for an hour",
+    "cart-turn": "figure 18: what robot and cart sweep in a turn by 90 degrees, with and without articulation",
+    "cart-doors": "chapter 4: the narrowest doorways and corners that robot and cart get through, both ways",
     "contact": "section 6.5.3: a wheel found on a table that is only pushed by another",
 }
 

@@ -4,7 +4,8 @@ from pbrl_planner.lattice.body import ArticulatedBody
 from pbrl_planner.lattice.cfg_file import Environment, read_environment
 from pbrl_planner.lattice.generator import GeneratorSettings, generate
 from pbrl_planner.lattice.grid import CostGrid
-from pbrl_planner.lattice.lattice import Lattice, Motions
+from pbrl_planner.lattice.lattice import Lattice
+from pbrl_planner.lattice.motions import Motions
 from pbrl_planner.lattice.mprim_file import read_primitives, write_primitives
 from pbrl_planner.lattice.plan import Improvement, LatticePlan
 from pbrl_planner.lattice.planner import plan

@@ -15,11 +15,20 @@ from pbrl_planner.lattice import search_kernel as kernel
 from pbrl_planner.lattice.lower_bound import LowerBound
 from pbrl_planner.lattice.plan import Improvement, LatticePlan
 from pbrl_planner.lattice.problem import LatticeProblem
+from pbrl_planner.lattice.reach import Reached, reach
 from pbrl_planner.lattice.settings import LatticeSettings
 
 AT_ONCE = 20_000
 """Expansions between two looks at the clock."""
 LARGEST_HEAP = 1 << 28
+FURTHER = 1.1
+"""Times the bound of the start, up to which the lower bound is made before there is a plan."""
+NEAR = 12
+"""Cells from where the search goes to within which no state is left out."""
+SCOUTED = 15_000
+"""Expansions of a search that leaves states out, at most, before it leaves out fewer."""
+SMALL = 2
+"""Of blocks: 4 cells. Only where a search that leaves out so few fails, too, it is asked whether there is any way."""
 ROOM = 1 << 14
 """Entries of the heap to begin with."""
 
@@ -41,7 +50,11 @@ def plan(
     Raises:
         PlannerError: costs are too large to be added up.
     """
-    return _Search(problem, settings or LatticeSettings(), improved).run()
+    search = _Search(problem, settings or LatticeSettings(), improved)
+    try:
+        return search.run()
+    finally:
+        search.give_back()
 
 
 class _Search:
@@ -63,12 +76,24 @@ class _Search:
         self._best: tuple[int, NDArray[np.int64]] | None = None
         self._epsilon, self._least = math.inf, 1
         self._bins = lattice.primitives.bins
-        self._bound = LowerBound.of(lattice, self._goal, settings.direction)
+        self._any: Reached | None = None
+        self._bound = LowerBound(lattice, self._goal, settings.direction)
+        self._bound.reach(self._root, FURTHER)
+        self._radius = self._bound.radius
         self._to_bound = self._elapsed()
-        self._records = np.zeros(lattice.cells * self._bins, dtype=np.int64)
+        self._taken = lattice.motions.shelf.take_records(lattice.cells * self._bins)
+        self._records = self._taken.array
         self._heap = np.empty(ROOM, dtype=np.int64)
         self._waiting = np.empty(ROOM, dtype=np.int64)
-        self._numbers = np.zeros(10, dtype=np.int64)
+        self._numbers = np.zeros(11, dtype=np.int64)
+        self._thin_out(settings.thinned.bit_length() - 1)
+
+    def give_back(self) -> None:
+        """Leave the large arrays to the next search; this one is over."""
+        self._lattice.motions.shelf.give_back(self._taken)
+
+    def _record(self, cost: int, rest: int) -> int:
+        return (self._taken.stamp << kernel.STAMP) | ((kernel.LIMIT - cost) << 16) | rest
 
     def run(self) -> LatticePlan:
         """Lower epsilon round by round."""
@@ -80,9 +105,14 @@ class _Search:
             return self._result(True, "there is no way for the robot's centre, or none to turn so, whatever it does")
         numerators = self._settings.numerators
         self._open(numerators[0])
-        place = 0
+        place = -1 if self._thin else 0
         while True:
             status = self._round()
+            if self._thin and status != kernel.DONE:
+                if self._any is None and self._thin <= SMALL and self._look_for_any():
+                    return self._result(self._best is None, self._reason())
+                place = self._scout_closer(numerators[0])
+                continue
             if status == kernel.BUDGET:
                 return self._stopped()
             if status == kernel.EXHAUSTED:
@@ -90,6 +120,39 @@ class _Search:
             place = self._next(numerators, place)
             if self._tell() or place >= len(numerators):
                 return self._result(False, "")
+            self._complete(numerators[place])
+
+    def _thin_out(self, thin: int) -> None:
+        """Leave out states from now on, but one in a block of 2^thin by 2^thin cells for each bin; 0: none."""
+        lattice = self._lattice
+        rows, columns = lattice.cells // lattice.stride, lattice.stride
+        blocks = ((rows >> thin) + 1) * ((columns >> thin) + 1) if thin else 0
+        self._thin, self._marks = thin, np.zeros((blocks, self._bins), dtype=np.uint8)
+        self._most = min(self._settings.expansions, int(self._numbers[kernel.EXPANDED]) + SCOUTED)
+
+    def _look_for_any(self) -> bool:
+        """Find out whether there is any way at all; return whether that, or the way itself, is answer enough."""
+        ends = self._root, self._goal
+        start, goal = ends if self._settings.direction == "forward" else ends[::-1]
+        self._any = reach(self._lattice, start, goal, self._settings.time_limit - self._elapsed())
+        if self._any.primitives is None:
+            return self._any.connected is False
+        cost = self._lattice.cost_along(self._problem.start_state, self._any.primitives)
+        self._best = (cost, self._any.primitives)
+        self._epsilon = cost / max(1, self._bound.at(self._root))
+        return self._tell()
+
+    def _reason(self) -> str:
+        assert self._any is not None, "called after that was found out"
+        return f"everything that can be reached from the {self._any.side} was looked at" if self._any.side else ""
+
+    def _scout_closer(self, numerator: int) -> int:
+        """Go over to smaller blocks, or to a search that leaves nothing out; return the place of its epsilon."""
+        thin = self._thin - 1
+        self._bound.finish()
+        self._merge(numerator)
+        self._thin_out(thin)
+        return -1 if thin else 0
 
     def _open(self, numerator: int) -> None:
         shift = int(self._lattice.cells * self._bins).bit_length()
@@ -98,7 +161,8 @@ class _Search:
         numbers[kernel.DENOMINATOR] = self._settings.denominator
         numbers[kernel.SHIFT], numbers[kernel.ROUND] = shift, 1
         numbers[kernel.MOST] = min(kernel.LIMIT, (1 << (62 - shift)) // numerator)
-        self._records[self._root] = kernel.LIMIT << 16
+        numbers[kernel.BEARS] = self._taken.stamp
+        self._records[self._root] = self._record(0, 0)
         numbers[kernel.TOUCHED] = 1
         self._heap[0] = ((numerator * self._bound.at(self._root)) << shift) | self._root
         numbers[kernel.HEAP] = 1
@@ -108,7 +172,8 @@ class _Search:
         lattice, tables, sweeps = self._lattice, self._tables, self._sweeps
         cost = lattice.cost.ravel()
         while True:
-            left = self._settings.expansions - int(self._numbers[kernel.EXPANDED])
+            most = self._most if self._thin else self._settings.expansions
+            left = most - int(self._numbers[kernel.EXPANDED])
             if left <= 0 or self._elapsed() >= self._settings.time_limit:
                 return kernel.BUDGET
             status = kernel.improve(
@@ -124,6 +189,7 @@ class _Search:
                 lattice.grid.blocked,
                 self._bins,
                 self._bound.toward,
+                self._radius,
                 self._bound.turning,
                 self._records,
                 self._heap,
@@ -131,12 +197,10 @@ class _Search:
                 self._numbers,
                 min(left, AT_ONCE),
                 lattice.stride,
-                sweeps.shape,
-                sweeps.pieces_first,
-                sweeps.pieces,
-                sweeps.levels,
-                sweeps.free,
-                sweeps.known,
+                sweeps,
+                self._thin,
+                NEAR,
+                self._marks,
             )
             if status == kernel.TOO_COSTLY:
                 raise PlannerError(
@@ -151,32 +215,52 @@ class _Search:
     def _next(self, numerators: list[int], place: int) -> int:
         """Note the plan, prove its bound, and make ready for the next epsilon that is below it; return its place."""
         moves, cost = self._way()
-        self._best = (cost, moves)
+        if self._best is None or cost < self._best[0]:
+            self._best = (cost, moves)
         # What is ahead of the goal on its way may have got cheaper since the goal was reached from there.
-        self._records[self._goal] = ((kernel.LIMIT - cost) << 16) | (int(self._records[self._goal]) & 0xFFFF)
+        self._records[self._goal] = self._record(cost, int(self._records[self._goal]) & 0xFFFF)
         while True:
             place += 1
-            entries = int(self._numbers[kernel.HEAP] + self._numbers[kernel.WAITING])
-            while len(self._heap) < entries + self._bins:
-                self._heap = _grown(self._heap)
             numerator = numerators[min(place, len(numerators) - 1)]
-            least = kernel.next_round(
-                self._bins,
-                self._bound.toward,
-                self._bound.turning,
-                self._records,
-                self._heap,
-                self._waiting,
-                self._numbers,
-                numerator,
-            )
-            self._least = max(1, self._least, min(least, cost))
-            proved = max(1.0, cost / self._least)
-            self._epsilon = min(self._epsilon, proved, numerators[place - 1] / self._settings.denominator)
+            least = self._merge(numerator)
+            self._least = max(1, self._least, min(least, self._best[0]))
+            proved = max(1.0, self._best[0] / self._least)
+            # A round that left states out promises nothing by itself.
+            asked = numerators[place - 1] / self._settings.denominator if place > 0 else math.inf
+            self._epsilon = min(self._epsilon, proved, asked)
             if place >= len(numerators) or self._epsilon <= self._settings.last_epsilon:
                 return len(numerators)
             if numerator < self._epsilon * self._settings.denominator:
                 return place
+
+    def _merge(self, numerator: int) -> int:
+        """Put all states that are not as good as they could be into one heap for an epsilon; return the least g + h."""
+        entries = int(self._numbers[kernel.HEAP] + self._numbers[kernel.WAITING])
+        while len(self._heap) < entries + self._bins:
+            self._heap = _grown(self._heap)
+        least = kernel.next_round(
+            self._bins,
+            self._bound.toward,
+            self._radius,
+            self._bound.radius,
+            self._bound.turning,
+            self._records,
+            self._heap,
+            self._waiting,
+            self._numbers,
+            numerator,
+        )
+        self._radius, self._thin = self._bound.radius, 0
+        return int(least)
+
+    def _complete(self, numerator: int) -> None:
+        """See to it that the lower bound is there on the whole floor: the first plan needs less of it."""
+        if self._radius < kernel.LIMIT:
+            self._bound.finish()
+            self._least = max(self._least, min(self._merge(numerator), self._cost_so_far()))
+
+    def _cost_so_far(self) -> int:
+        return kernel.LIMIT if self._best is None else self._best[0]
 
     def _way(self) -> tuple[NDArray[np.int64], int]:
         """Return the primitives (k,) from start to goal and what they cost together."""
@@ -205,6 +289,8 @@ class _Search:
             spent = int(self._numbers[kernel.EXPANDED]) >= settings.expansions
             effort = f"with {settings.expansions} expansions" if spent else f"in {settings.time_limit:g} s"
             return self._result(False, f"no plan found {effort}; there may be one: allow more")
+        if int(self._records[self._goal]) >> kernel.STAMP != self._taken.stamp:
+            return self._result(False, "")
         moves, cost = self._way()
         if cost < self._best[0]:
             self._best = (cost, moves)

@@ -23,6 +23,9 @@ class LatticeSettings(Section):
         direction: from the start or from the goal. The plans cost the same once epsilon is 1; which is found sooner
             depends on which end is more shut in.
         expansions: most, in all.
+        thinned: cells along the side of the blocks in each of which a first search expands but one state for each
+            heading and articulation; 1: there is no such search. It finds a plan soon in large places; its bound is
+            what is proved of it, and may be above `epsilon`.
     """
 
     epsilon: Annotated[float, Field(ge=1.0, le=1000.0)] = 3.0
@@ -31,6 +34,7 @@ class LatticeSettings(Section):
     time_limit: Positive = 10.0
     direction: Literal["forward", "backward"] = "backward"
     expansions: Annotated[int, Field(ge=1)] = 10**12
+    thinned: Literal[1, 2, 4, 8] = 1
 
     @model_validator(mode="after")
     def _descends(self) -> Self:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_planner.lattice.moves import Move
+from pbrl_planner.lattice.sweep_kernel import SweepTables, lay_out
+
 Int = NDArray[np.int32]
 Word = NDArray[np.uint64]
 Mask = NDArray[np.bool_]
+Cut = list[Int]
 WORD = 64
 
 
@@ -18,78 +23,93 @@ class Floor:
     """Where something stands, the map's outside included, with a border that no sweep leaves.
 
     Attributes:
-        taken: (rows, columns) with the border.
         border: cells of it, to each side of the search's grid.
         levels: (levels, rows, words) bits; see `is_free`.
     """
 
-    taken: Mask
     border: int
     levels: Word
 
     @classmethod
-    def of(cls, taken: Mask, border: int) -> Floor:
+    def of(cls, cost: NDArray[np.uint8], lethal: int, border: int) -> Floor:
         """Put a border around the search's grid (rows, columns), and lay out its bits.
 
         Args:
-            taken: where something stands; all that is outside of the map has to be so already.
+            cost: of its cells; all that is outside of the map has to be lethal already.
+            lethal: cost from which something stands there.
             border: cells that a sweep reaches from where it begins.
         """
-        rows, columns = taken.shape
+        rows, columns = cost.shape
         words = -(-columns // WORD)
         wide = words * WORD + 2 * border + 2 * WORD
-        held = np.ones((rows + 2 * border, -(-wide // WORD) * WORD), dtype=bool)
-        held[border : border + rows, border : border + columns] = taken
-        levels = [held]
-        while (1 << len(levels)) <= 2 * border + 1:
-            half = 1 << (len(levels) - 1)
-            level = np.ones_like(held)
-            level[:, :-half] = levels[-1][:, :-half] | levels[-1][:, half:]
-            levels.append(level)
-        packed = [np.packbits(level, axis=1, bitorder="little").view(np.uint64) for level in levels]
-        return cls(held, border, np.ascontiguousarray(np.stack(packed)))
+        count = (2 * border + 1).bit_length()
+        levels = np.empty((count, rows + 2 * border, -(-wide // WORD)), dtype=np.uint64)
+        lay_out(cost, lethal, border, levels)
+        return cls(border, levels)
 
 
 @dataclass(frozen=True)
-class Sweeps:
-    """What `improve` needs to know whether a move's sweep is free; see there.
+class Shapes:
+    """What moves cover, cut up: what all moves from or into a bin have in common, and what each covers beside that.
 
     Attributes:
-        shape: (2,) rows and columns of the floor's border; (0,) where a point moves.
-        pieces_first: (m + 1,).
-        pieces: (p, 3) row, column, level.
-        levels: of the floor.
-        free: (rows, words, m) answers so far.
-        known: (rows, words, m) which are there.
+        stays: of each bin, relative to the state's cell.
+        forward, backward: of each move, relative to the cell that it begins in, or ends in.
     """
 
-    shape: Int
-    pieces_first: Int
-    pieces: Int
-    levels: Word
-    free: Word
-    known: NDArray[np.uint8]
+    stays: Cut
+    forward: Cut
+    backward: Cut
 
     @classmethod
-    def none(cls) -> Sweeps:
-        """Return those of a point."""
-        empty = np.zeros((1, 1, 1), dtype=np.uint64)
-        ints = np.zeros(0, dtype=np.int32)
-        return cls(ints, np.zeros(1, dtype=np.int32), ints.reshape(0, 3), empty, empty, empty.astype(np.uint8))
+    def of(cls, moves: Sequence[Move], masks: Sequence[Mask], bins: int) -> Shapes:
+        """Split moves' masks, each relative to where its move begins.
 
-    @classmethod
-    def of(cls, cut: list[Int], floor: Floor, rows: int, columns: int) -> Sweeps:
-        """Lay out sweeps, cut into pieces and in the order of the moves, on a search's grid."""
-        first = np.concatenate(([0], np.cumsum([len(each) for each in cut]))).astype(np.int32)
-        answers = (rows, -(-columns // WORD), len(cut))
-        return cls(
-            np.full(2, floor.border, dtype=np.int32),
-            first,
-            np.ascontiguousarray(np.concatenate(cut), dtype=np.int32),
-            floor.levels,
-            np.zeros(answers, dtype=np.uint64),
-            np.zeros(answers, dtype=np.uint8),
-        )
+        Args:
+            moves: as the masks.
+            masks: (2 r + 1, 2 r + 1) each.
+            bins: of heading and articulation.
+        """
+        reach = max(len(mask) // 2 + max(abs(move.dx), abs(move.dy)) for mask, move in zip(masks, moves, strict=True))
+        common: list[Mask | None] = [None] * bins
+        for move, mask in zip(moves, masks, strict=True):
+            for bin_, dx, dy in ((move.source, 0, 0), (move.target, move.dx, move.dy)):
+                seen = _framed(mask, reach, -dx, -dy)
+                before = common[bin_]
+                common[bin_] = seen if before is None else before & seen
+        stays = [np.zeros((1, 1), dtype=bool) if each is None else each for each in common]
+        forward, backward = [], []
+        for move, mask in zip(moves, masks, strict=True):
+            both = _framed(stays[move.source], reach, 0, 0) | _framed(stays[move.target], reach, move.dx, move.dy)
+            left = _framed(mask, reach, 0, 0) & ~both
+            forward.append(cut_up(left))
+            backward.append(cut_up(left, move.dx, move.dy))
+        return cls([cut_up(each) for each in stays], forward, backward)
+
+
+def _framed(mask: Mask, reach: int, dx: int, dy: int) -> Mask:
+    """Return a mask, moved by (dx, dy), in a frame of another reach; what lies beyond that is left out."""
+    found = np.zeros((2 * reach + 1, 2 * reach + 1), dtype=bool)
+    y, x = np.nonzero(mask)
+    y, x = y - len(mask) // 2 + dy + reach, x - len(mask) // 2 + dx + reach
+    inside = (y >= 0) & (y <= 2 * reach) & (x >= 0) & (x <= 2 * reach)
+    found[y[inside], x[inside]] = True
+    return found
+
+
+def point_sweeps() -> SweepTables:
+    """Return the tables of a point, which sweeps nothing."""
+    ints, words, stamps = np.zeros(0, np.int32), np.zeros((1, 1, 1), np.uint64), np.zeros((1, 1, 1), np.uint16)
+    none = ints.reshape(0, 3)
+    return SweepTables(
+        -1, ints, ints, ints.reshape(0, 2), ints, none, ints, none, words, words, stamps, words, stamps, 1, 1
+    )
+
+
+def joined(cut: Cut) -> tuple[Int, Int]:
+    """Return where each set's pieces begin (n + 1,), and all pieces (p, 3)."""
+    first = np.concatenate(([0], np.cumsum([len(each) for each in cut]))).astype(np.int32)
+    return first, np.ascontiguousarray(np.concatenate(cut), dtype=np.int32)
 
 
 def cut_up(mask: Mask, dx: int = 0, dy: int = 0) -> Int:
@@ -107,3 +127,12 @@ def cut_up(mask: Mask, dx: int = 0, dy: int = 0) -> Int:
     one = np.stack((row, left, level), axis=1)
     two = np.stack((row, left + lengths - (1 << level), level), axis=1)
     return np.concatenate((one, two[lengths != 1 << level])).astype(np.int32)
+
+
+def cut_cells(cells: Collection[tuple[int, int]]) -> Int:
+    """Return cells (x, y), relative to one of them, as pieces (p, 3); see `cut_up`."""
+    reach = max(max(abs(x), abs(y)) for x, y in cells)
+    mask = np.zeros((2 * reach + 1, 2 * reach + 1), dtype=bool)
+    for x, y in cells:
+        mask[y + reach, x + reach] = True
+    return cut_up(mask)

@@ -1,0 +1,336 @@
+"""The PR2 pushes a cart through an office to a goal, without middleware: simulator, planner and controller in one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from time import thread_time
+
+import numpy as np
+
+from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
+from pbrl_bringup.cart.senses import CartSenses
+from pbrl_control.cart import (
+    CartBody,
+    CartCommand,
+    CartController,
+    CartLimits,
+    CartPlan,
+    CartSettings,
+    Cause,
+    DriveStatus,
+)
+from pbrl_control.planar import Array, compose, wrap
+from pbrl_planner.cart.navigator import PATIENCE, Answer, Navigator
+from pbrl_planner.cart.outline import motions
+from pbrl_planner.costmap import CostField
+from pbrl_planner.lattice import LatticePlan, LatticeSettings, Motions
+from pr2_cart_sim.scene import OfficeScene
+from pr2_cart_sim.sensing import in_base
+from pr2_cart_sim.session import Pr2Session
+
+TICK = 0.05
+"""Of the local controller [s]; thesis: 20 Hz."""
+SIDES = ("left", "right")
+LONGEST = 300.0
+"""Simulated time after which a leg is given up [s]."""
+BLOCKED = 2.0
+"""Time before something that is in the way after which a way round it is looked for [s]."""
+RETRY, RETRY_MOST = 2.0, 6.0
+"""Time between two calls of the planner of which the first found nothing [s]; twice as long after each more, at most
+the second: that there is no path is true of a moment, and people walk on."""
+UNSEEN = 5.0
+"""Time after which something that nobody has seen since is taken to be gone, where it leaves no path [s]."""
+REFRESH = 15.0
+"""Time on one plan after which it is made again: the floor is better known by then [s]."""
+AHEAD, ENOUGH = 0.3, 1.5
+"""Way [m, rad] along a plan after which the next one begins; what is left of it at least for that to be worth it."""
+IN_THE_WAY = (Cause.OBSTACLE, Cause.FOOTPRINT)
+"""Why a plan is given up that may be good again in a moment."""
+TRACED = 0.5
+"""Between two points of the trace [s]."""
+SETTINGS = CartSettings(limits=CartLimits(articulation=(-0.45, 0.45)), delay=0.03, margin=0.015)
+
+
+@dataclass
+class _Going:
+    """A plan that is driven: its controller, when it began, since when it stands before something."""
+
+    plan: LatticePlan
+    controller: CartController
+    since: float
+    blocked: float | None = None
+
+
+@dataclass
+class _Ticks:
+    """Of each tick on a plan: how far it is off, and what the controller took of a core."""
+
+    position: list[float] = field(default_factory=list)
+    angle: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+
+
+class CartRun:
+    """One session and what drives in it; what is thought takes no simulated time.
+
+    Args:
+        session: of the simulator, the cart in both hands.
+        goal: (3,) of `base` in `map` [m, rad].
+        swept: motions of robot and cart.
+        planning: epsilons and patience of the planner.
+        settings: of the local controller.
+
+    Attributes:
+        senses: all that is perceived.
+        navigator: plans, and has an account of it.
+        trace: the story so far.
+    """
+
+    def __init__(
+        self,
+        session: Pr2Session,
+        goal: Array,
+        swept: Motions,
+        planning: LatticeSettings = PATIENCE,
+        settings: CartSettings = SETTINGS,
+    ) -> None:
+        self.session, self.goal = session, np.asarray(goal, dtype=float)
+        self.senses = CartSenses(swept.primitives.resolution)
+        self.navigator = Navigator(swept, planning)
+        self.trace: list[Trace] = []
+        self.ended = ""
+        self.reached = False
+        self.ticks = _Ticks()
+        self.last_plan: LatticePlan | None = None
+        self._settings = settings
+        self._going: _Going | None = None
+        self._sent = np.zeros(4)
+        self._next_tick, self._next_plan, self._next_trace = 0.0, 0.0, 0.0
+        self._pause = RETRY
+
+    def step(self) -> None:
+        """Advance the simulator by one step; perceive, and control at each tick."""
+        for observation in self.session.step():
+            self.senses.hear(observation)
+        now = self.session.time
+        if now + 1e-9 >= self._next_tick:
+            self._next_tick += TICK
+            self._tick(now)
+
+    def _tick(self, now: float) -> None:
+        command: CartCommand | None = None
+        if self._going is None and now >= self._next_plan:
+            self._set_out(now)
+        percept = self.senses.percept(now)
+        if self._going is not None and percept is not None:
+            began = thread_time()
+            command = self._going.controller.step(now, percept)
+            self.ticks.seconds.append(round(thread_time() - began, 7))
+            self._send(command)
+            self._note_errors(command)
+            self._heed(now, command)
+        else:
+            self.session.command_base(0.0, 0.0, 0.0)
+            self._sent = np.zeros(4)
+        if now + 1e-9 >= self._next_trace:
+            self._next_trace += TRACED
+            self.trace.append(self._traced(now, command))
+
+    def _send(self, command: CartCommand) -> None:
+        self.session.command_base(*map(float, command.twist))
+        if command.joint_rates is not None:
+            for side, rates in zip(SIDES, command.joint_rates, strict=True):
+                self.session.command_arm(side, rates.tolist())
+        self._sent = np.append(command.twist, command.articulation_rate)
+
+    def _heed(self, now: float, command: CartCommand) -> None:
+        """Do what the controller's status asks for."""
+        going = self._going
+        assert going is not None, "called while a plan is driven"
+        if command.status is DriveStatus.ARRIVED:
+            self.reached, self.ended = True, "at the goal"
+        elif command.status is DriveStatus.FAILED:
+            self.ended = command.reason
+        elif command.status is DriveStatus.REPLAN:
+            self.senses.recover(now)
+            self._give_up(now, going, command)
+        elif command.status is DriveStatus.BLOCKED:
+            going.blocked = now if going.blocked is None else going.blocked
+            if now - going.blocked >= BLOCKED and now >= self._next_plan:
+                self._set_out(now)
+        else:
+            going.blocked = None
+            if now - going.since >= REFRESH and now >= self._next_plan:
+                self._go_over(now, going, command.goal)
+
+    def _give_up(self, now: float, going: _Going, command: CartCommand) -> None:
+        """Have another plan made; while there is none, wait on what is left of this one for the way to get free."""
+        self._going = None
+        if command.cause in IN_THE_WAY and self.senses.body is not None:
+            left = self._controller(rest(going.plan, command.goal), self.senses.body)
+            self._going = _Going(going.plan, left, going.since, now if going.blocked is None else going.blocked)
+
+    def _set_out(self, now: float) -> None:
+        """Plan from here, and drive that; without a plan go on with the old one, if any, and try again later."""
+        here, floor, body = self.senses.state(now), self.senses.floor(now), self.senses.body
+        if here is None or floor is None or body is None:
+            return
+        made = self._asked(now, floor, here)
+        if made is None and self.navigator.calls[-1].answer is Answer.SHUT_IN:
+            self.senses.recover(now)
+        elif made is None and any(len(each.places) for each in self.senses.forget_unseen(now, UNSEEN)):
+            self._pause, self._next_plan = RETRY, now + RETRY
+        if made is None:
+            return
+        self._going = _Going(made, self._controller(np.vstack([here, made.poses]), body), now)
+
+    def _asked(self, now: float, floor: CostField, begin: Array) -> LatticePlan | None:
+        """Return a plan from a pose (4,) on, and take note of when to ask again."""
+        made = self.navigator.plan(now, floor, begin, self.goal)
+        found = made is not None
+        late = now - self._next_plan > RETRY_MOST
+        self._next_plan = now + (RETRY if found or late else self._pause)
+        self._pause = RETRY if found else min(2.0 * (RETRY if late else self._pause), RETRY_MOST)
+        self.last_plan = made if found else self.last_plan
+        return made
+
+    def _go_over(self, now: float, going: _Going, aim: Array) -> None:
+        """Plan again from a little further along the plan that is driven; drive that where it is another."""
+        floor, body = self.senses.floor(now), self.senses.body
+        head = onward(going.plan, aim)
+        if floor is None or body is None or head is None:
+            return
+        going.since = now
+        made = self._asked(now, floor, head[-1])
+        if made is None or np.array_equal(made.primitives, going.plan.primitives[-len(made.primitives) :]):
+            return
+        self._going = _Going(made, self._controller(np.vstack([head, made.poses]), body), now)
+
+    def _controller(self, poses: Array, body: CartBody) -> CartController:
+        """Return a controller that goes along poses (m, 4), of which the first is about here."""
+        poses = np.array(poses)
+        low, high = self._settings.limits.articulation
+        poses[:, 3] = np.clip(poses[:, 3], low, high)
+        plan = CartPlan.timed(poses, self._settings.limits, self._settings.share)
+        return CartController(plan, body, self._settings, self._sent)
+
+    def _note_errors(self, command: CartCommand) -> None:
+        if command.status is DriveStatus.MOVING and np.isfinite(command.error).all():
+            self.ticks.position.append(round(math.hypot(*command.error[:2]), 5))
+            self.ticks.angle.append(round(float(np.abs(command.error[2:]).max()), 5))
+
+    def _traced(self, now: float, command: CartCommand | None) -> Trace:
+        office = self.session.office
+        assert office.cart is not None, "the scene has a cart"
+        body, base = office.world.pose(office.cart), self.session.robot.base_pose()
+        pose = self.session.robot_truth()[0]
+        places = {name: (float(each.place[0]), float(each.place[1])) for name, each in self.session.people.items()}
+        return Trace(
+            now,
+            tuple(map(float, pose)),
+            tuple(map(float, compose(pose, in_base(base, body)))),
+            "planning" if command is None else str(command.status),
+            "" if command is None else str(command.cause),
+            places,
+        )
+
+
+def run_cart(
+    scene: OfficeScene,
+    goal: Array,
+    seed: int,
+    longest: float = LONGEST,
+    coarse: bool = False,
+    planning: LatticeSettings = PATIENCE,
+) -> CartOutcome:
+    """Drive to a goal in an office.
+
+    Args:
+        scene: with people and clutter, which reach the simulator only; the robot holds a cart.
+        goal: (3,) of `base` in `map` [m, rad].
+        seed: of world, people and sensors.
+        longest: simulated time after which it is given up [s].
+        coarse: plan on larger cells with half the headings: for tests.
+        planning: epsilons and patience of the planner.
+    """
+    assert scene.robot.holds is not None, "the robot holds a cart"
+    size = np.array(scene.bodies[scene.robot.holds].footprint)
+    length, width = np.ptp(size, axis=0)
+    with Pr2Session(scene, seed=seed) as session:
+        run = CartRun(session, goal, motions(float(length), float(width), coarse), planning)
+        while session.time < longest and not run.ended:
+            run.step()
+        return outcome(run)
+
+
+def outcome(run: CartRun) -> CartOutcome:
+    """Return what became of a run, scored by the truth."""
+    session = run.session
+    pose = session.robot_truth()[0]
+    places = np.array([each.base[:2] for each in run.trace]).reshape(-1, 2)
+    score = Score(
+        tuple(Touch(each.mover, each.other, each.person, each.start, each.peak) for each in session.contacts),
+        _finite(session.clearance.person),
+        _finite(session.clearance.thing),
+        tuple(run.ticks.position),
+        tuple(run.ticks.angle),
+        tuple(run.ticks.seconds),
+        float(np.hypot(*(pose[:2] - run.goal[:2]))),
+        abs(wrap(float(pose[2] - run.goal[2]))),
+        float(np.hypot(*np.diff(places, axis=0).T).sum()),
+    )
+    last = run.navigator.calls[-1] if run.navigator.calls else None
+    sentence = run.ended or f"not at the goal after {session.time:.0f} s; the last call of the planner: " + (
+        "none" if last is None else f"{last.answer} {last.reason}"
+    )
+    room = run.senses.room if run.senses.room is not None else np.zeros((0, 2))
+    poses = run.last_plan.poses if run.last_plan is not None else np.zeros((0, 4))
+    return CartOutcome(
+        run.reached,
+        sentence,
+        session.time,
+        tuple(run.navigator.calls),
+        tuple(run.trace),
+        score,
+        tuple(map(float, run.goal)),
+        tuple(tuple(map(float, corner)) for corner in room),
+        tuple(tuple(map(float, pose)) for pose in poses),
+    )
+
+
+def onward(plan: LatticePlan, aim: Array) -> Array | None:
+    """Return the poses (m, 4) of a plan from where it is driven now to a state of the lattice that lies ahead.
+
+    Args:
+        plan: that is driven.
+        aim: (4,) of it that the controller goes for now.
+
+    Returns:
+        None where the plan ends soon.
+    """
+    here = _nearest(plan, aim)
+    left = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(plan.poses[here:], axis=0)).sum(axis=1))))
+    ahead = [
+        k
+        for k in range(here + 1, len(plan.poses))
+        if left[k - here] >= AHEAD and (plan.waypoints == plan.poses[k]).all(axis=1).any()
+    ]
+    if not ahead or left[-1] < ENOUGH:
+        return None
+    return np.vstack([aim, plan.poses[here + 1 : ahead[0] + 1]])
+
+
+def rest(plan: LatticePlan, aim: Array) -> Array:
+    """Return what is left of a plan as poses (m, 4), from a pose (4,) of it that the controller goes for."""
+    return np.vstack([aim, plan.poses[_nearest(plan, aim) + 1 :]])
+
+
+def _nearest(plan: LatticePlan, aim: Array) -> int:
+    off = plan.poses - aim
+    off[:, 2] = np.mod(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi
+    return int(np.argmin(np.sum(off**2, axis=1)))
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,142 @@
+"""From a goal to its end: when to plan, when to drive, when to try again. A table without ROS; time is given."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from pbrl_planner.cart.query import Outcome
+from pbrl_planner.cart.settings import NavigationSettings
+
+
+class LegState(StrEnum):
+    """What is going on."""
+
+    PLANNING = "planning"
+    DRIVING = "driving"
+    WAITING = "waiting"
+    ARRIVED = "arrived"
+    FAILED = "failed"
+
+
+class Drove(StrEnum):
+    """How a drive along a path ended."""
+
+    ARRIVED = "arrived"
+    REPLAN = "given up; plan again"
+    GRIP_LOST = "the cart is not held as it should be"
+    REFUSED = "no path that can be driven"
+    STOPPED = "stopped"
+
+
+class Order(StrEnum):
+    """What is to be done now."""
+
+    NOTHING = ""
+    PLAN = "ask the planner"
+    CLEAR = "clear the costmaps where robot and cart are"
+    FORGET = "forget what nobody has seen of late"
+    FOLLOW = "drive along the path"
+    END = "say how it ended"
+
+
+ENDED = (LegState.ARRIVED, LegState.FAILED)
+HOPELESS = (Outcome.GOAL_OFF_MAP, Outcome.START_OFF_MAP)
+"""What no patience mends."""
+
+
+class Leg:
+    """One goal.
+
+    Args:
+        settings: when to plan again, and when to give up.
+        now: [s].
+
+    Attributes:
+        state: what is going on.
+        sentence: the same, and why, for a person.
+        plans: calls of the planner that were answered.
+        failures: those that found no path.
+        began: [s].
+    """
+
+    def __init__(self, settings: NavigationSettings, now: float) -> None:
+        self._settings = settings
+        self.began = now
+        self.state, self.sentence = LegState.PLANNING, "looking for a path"
+        self.plans = self.failures = 0
+        self._asked = self._driving = self._stands = False
+        self._next, self._pause = now, settings.retry
+        self._without: float | None = None
+
+    def tick(self, now: float) -> Order:
+        """Return what is due now."""
+        if self.state in ENDED or self._asked or self._driving or now < self._next:
+            return Order.NOTHING
+        return self._ask()
+
+    def planned(self, now: float, outcome: Outcome, message: str) -> Order:
+        """Take in the planner's answer."""
+        self._asked = False
+        if self.state in ENDED:
+            return Order.NOTHING
+        self.plans += 1
+        if outcome is Outcome.FOUND:
+            self._next, self._pause = now + self._settings.retry, self._settings.retry
+            if self._driving and not self._stands:  # who was in the way is gone, and the path begins behind the robot
+                return Order.NOTHING
+            self._without, self._driving, self._stands = None, True, False
+            return self._say(LegState.DRIVING, message, Order.FOLLOW)
+        self.failures += 1
+        self._next, self._pause = now + self._pause, min(2.0 * self._pause, self._settings.retry_most)
+        if outcome in HOPELESS:
+            return self._say(LegState.FAILED, message, Order.END)
+        if self._driving:
+            self.sentence = f"stands before something; {message}"
+            return Order.FORGET
+        self._without = now if self._without is None else self._without
+        if now - self._without > self._settings.give_up:
+            words = f"no path for {now - self._without:.0f} s; {message}"
+            return self._say(LegState.FAILED, words, Order.END)
+        # What is marked where the robot stands may never have been there; what is there is soon seen again.
+        order = Order.CLEAR if outcome is Outcome.START_OCCUPIED else Order.FORGET
+        return self._say(LegState.WAITING, message, order)
+
+    def driving(self, now: float, blocked: float, reason: str) -> Order:
+        """Take in how the drive goes on: for how long it has stood before something [s], and why it is slow."""
+        if self.state is not LegState.DRIVING:
+            return Order.NOTHING
+        self._stands = blocked > 0.0
+        self.sentence = reason if reason and self._stands else "on the way"
+        if blocked < self._settings.blocked or self._asked or now < self._next:
+            return Order.NOTHING
+        return self._ask()
+
+    def drove(self, ended: Drove, message: str) -> Order:
+        """Take in how the drive ended; not for one whose place another path has taken."""
+        self._driving = False
+        if self.state in ENDED:
+            return Order.NOTHING
+        if ended is Drove.ARRIVED:
+            return self._say(LegState.ARRIVED, "at the goal", Order.END)
+        if ended is Drove.REPLAN:
+            return self._say(LegState.WAITING, message, Order.CLEAR)
+        return self._say(LegState.FAILED, message or str(ended), Order.END)
+
+    @property
+    def asked(self) -> bool:
+        """Whether the planner has not answered yet."""
+        return self._asked and self.state not in ENDED
+
+    def refuse(self, sentence: str) -> None:
+        """Fail: it is no goal, or nobody wants it any more."""
+        self.state, self.sentence = LegState.FAILED, sentence
+
+    def _ask(self) -> Order:
+        self._asked = True
+        if not self._driving:
+            self.state = LegState.PLANNING
+        return Order.PLAN
+
+    def _say(self, state: LegState, sentence: str, order: Order) -> Order:
+        self.state, self.sentence = state, sentence
+        return order

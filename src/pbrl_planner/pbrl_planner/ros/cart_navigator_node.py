@@ -1,0 +1,249 @@
+"""Brings robot and cart to a goal: from RViz on /goal_pose, or by the action /navigate_cart; the last one counts.
+
+It asks /plan_cart_path, hands the path to /follow_cart_path, and asks again where something stays in the way, a path
+was given up, or there was none: people leave. /cart_navigator/status (std_msgs/String) says where it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from pbrl_msgs.action import FollowCartPath, NavigateCart, PlanCartPath
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from pbrl_bag.ros.parameters import refuse_unknown
+from pbrl_control.ros.qos import COMMANDS
+from pbrl_planner.cart.leg import ENDED, Drove, Leg, LegState, Order
+from pbrl_planner.cart.query import Outcome
+from pbrl_planner.errors import PlannerError
+from pbrl_planner.ros.conversions import pose_in_map
+from pbrl_planner.ros.one_goal import OneGoal
+from pbrl_planner.ros.running import declare_settings, run_node
+from pbrl_planner.ros.saying import Saying
+
+TICK = 0.1
+"""[s] of the node's clock."""
+NO_PLANNER = "no action /plan_cart_path; is lattice_planner_node running?"
+NO_CONTROLLER = "no action /follow_cart_path; is cart_controller_node running?"
+ENDS = {getattr(FollowCartPath.Result, each.name): each for each in Drove}
+
+
+@dataclass
+class _Drive:
+    """A path that is driven: the action's handle, once it is accepted, and whether it still is wanted."""
+
+    handle: Any = None
+    wanted: bool = True
+
+    def stop(self) -> None:
+        self.wanted = False
+        if self.handle is not None:
+            self.handle.cancel_goal_async()
+
+
+class CartNavigatorNode(Node):
+    """One goal at a time."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("cart_navigator_node", **options)
+        self._settings = declare_settings(self).navigation
+        refuse_unknown(self)
+        self._goal: PoseStamped | None = None
+        self._leg: Leg | None = None
+        self._number = 0
+        self._drive: _Drive | None = None
+        self._mending = False
+        self._epsilon = self._remaining = 0.0
+        self._planner = ActionClient(self, PlanCartPath, "/plan_cart_path")
+        self._driver = ActionClient(self, FollowCartPath, "/follow_cart_path")
+        self._mend = {
+            Order.CLEAR: self.create_client(Trigger, "/costmaps/clear"),
+            Order.FORGET: self.create_client(Trigger, "/costmaps/forget_unseen"),
+        }
+        self._goals = OneGoal(
+            self,
+            NavigateCart,
+            "/navigate_cart",
+            lambda request: self._aim(request.goal),
+            self._cancel,
+            lambda why: NavigateCart.Result(success=False, message=why),
+        )
+        self.create_subscription(PoseStamped, "/goal_pose", self._on_goal_pose, COMMANDS)
+        self.create_timer(TICK, self._tick)
+        self._say = Saying(self, "/cart_navigator/status", "waiting for a goal on /goal_pose")
+
+    def destroy_node(self) -> None:
+        """Leave the graph."""
+        self._goals.destroy()
+        self._planner.destroy()
+        self._driver.destroy()
+        super().destroy_node()
+
+    # Goals
+
+    def _on_goal_pose(self, message: PoseStamped) -> None:
+        self._goals.replaced("another goal was given on /goal_pose")
+        self._aim(message)
+
+    def _aim(self, goal: PoseStamped) -> None:
+        """Set out for a goal; until there is a path to it the robot stands."""
+        self._number += 1
+        self._stop()
+        self._goal, self._leg = goal, Leg(self._settings, self._now())
+        try:
+            x, y, heading = pose_in_map(goal, "goal")
+        except PlannerError as error:
+            self._leg.refuse(str(error))
+            self._end()
+            return
+        self._say(f"goal: {x:.2f} {y:.2f} {heading:.2f}")
+        self._tick()
+
+    def _cancel(self) -> None:
+        if self._leg is not None:
+            self._leg.refuse("cancelled")
+            self._end()
+
+    def _end(self) -> None:
+        """Stop what is driven, if it is not there, and say how it ended."""
+        leg = self._leg
+        assert leg is not None
+        self._number += 1  # whatever is answered from now on is not wanted any more
+        self._stop()
+        result = NavigateCart.Result(success=leg.state is LegState.ARRIVED, message=leg.sentence)
+        result.plans, result.failures, result.seconds = leg.plans, leg.failures, self._now() - leg.began
+        self._say(f"{leg.state}: {leg.sentence}")
+        self._goals.end(result, leg.state is LegState.ARRIVED)
+
+    def _stop(self) -> None:
+        drive, self._drive = self._drive, None
+        if drive is not None:
+            drive.stop()
+
+    # What is due
+
+    def _tick(self) -> None:
+        leg = self._leg
+        if leg is None or leg.state in ENDED:
+            return
+        self._look_after_others(leg)
+        if not self._mending:
+            self._do(leg.tick(self._now()))
+        self._say(f"{leg.state}: {leg.sentence}")
+        feedback = NavigateCart.Feedback(state=str(leg.state), sentence=leg.sentence)
+        feedback.plans, feedback.failures = leg.plans, leg.failures
+        feedback.epsilon, feedback.remaining = self._epsilon, self._remaining
+        self._goals.tell(feedback)
+
+    def _look_after_others(self, leg: Leg) -> None:
+        """Go on where whoever was to answer is gone: an answer will not come any more."""
+        if leg.asked and not self._planner.server_is_ready():
+            self._number += 1
+            self._do(leg.planned(self._now(), Outcome.NOT_READY, NO_PLANNER))
+        if self._drive is not None and not self._driver.server_is_ready():
+            self._drive = None
+            self._do(leg.drove(Drove.REFUSED, NO_CONTROLLER))
+        if self._mending and not any(each.service_is_ready() for each in self._mend.values()):
+            self._mending = False
+
+    def _do(self, order: Order, path: Any = None) -> None:
+        if order is Order.PLAN:
+            self._ask()
+        elif order is Order.FOLLOW:
+            self._follow(path)
+        elif order in self._mend:
+            self._mend_costmaps(order)
+        elif order is Order.END:
+            self._end()
+
+    # The planner
+
+    def _ask(self) -> None:
+        assert self._goal is not None and self._leg is not None
+        if not self._planner.server_is_ready():
+            self._do(self._leg.planned(self._now(), Outcome.NOT_READY, NO_PLANNER))
+            return
+        sent = self._planner.send_goal_async(
+            PlanCartPath.Goal(goal=self._goal), feedback_callback=partial(self._on_better, self._number)
+        )
+        sent.add_done_callback(partial(self._on_asked, self._number))
+
+    def _on_better(self, number: int, message: Any) -> None:
+        if number == self._number:
+            self._epsilon = float(message.feedback.epsilon)
+
+    def _on_asked(self, number: int, future: Future) -> None:
+        handle = future.result()
+        if handle is not None:
+            handle.get_result_async().add_done_callback(partial(self._on_planned, number))
+
+    def _on_planned(self, number: int, future: Future) -> None:
+        if number != self._number or self._leg is None:
+            return
+        result = future.result().result
+        self._do(self._leg.planned(self._now(), Outcome(result.outcome), result.message), result.path)
+
+    # The controller
+
+    def _follow(self, path: Any) -> None:
+        assert self._leg is not None
+        if not self._driver.server_is_ready():
+            self._do(self._leg.drove(Drove.REFUSED, NO_CONTROLLER))
+            return
+        # Of another path that is driven nothing more is wanted: the controller lets this one take its place.
+        drive = self._drive = _Drive()
+        sent = self._driver.send_goal_async(
+            FollowCartPath.Goal(path=path), feedback_callback=partial(self._on_driving, drive)
+        )
+        sent.add_done_callback(partial(self._on_followed, drive))
+
+    def _on_followed(self, drive: _Drive, future: Future) -> None:
+        drive.handle = future.result()
+        if drive.handle is None:
+            return
+        drive.handle.get_result_async().add_done_callback(partial(self._on_drove, drive))
+        if not drive.wanted:
+            drive.stop()
+
+    def _on_driving(self, drive: _Drive, message: Any) -> None:
+        if drive is not self._drive or self._leg is None:
+            return
+        feedback = message.feedback
+        self._remaining = float(feedback.remaining)
+        self._do(self._leg.driving(self._now(), float(feedback.blocked), feedback.reason))
+
+    def _on_drove(self, drive: _Drive, future: Future) -> None:
+        if drive is not self._drive or self._leg is None:
+            return
+        self._drive = None
+        result = future.result().result
+        self._do(self._leg.drove(ENDS[result.outcome], result.message))
+
+    def _mend_costmaps(self, order: Order) -> None:
+        """Have the costmaps' node do what is ordered; nothing is planned before it has, if it is there."""
+        if self._mend[order].service_is_ready():
+            self._mending = True
+            self._mend[order].call_async(Trigger.Request()).add_done_callback(self._on_mended)
+
+    def _on_mended(self, _: Future) -> None:
+        self._mending = False
+
+    # Small things
+
+    def _now(self) -> float:
+        return self.get_clock().now().nanoseconds * 1e-9
+
+
+def main() -> None:
+    """Run the node until it is told to stop."""
+    run_node("cart_navigator_node", CartNavigatorNode)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,35 @@
+"""Status of a node in a sentence: on a topic, and in the log, when it changes."""
+
+from __future__ import annotations
+
+import re
+
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from pbrl_control.ros.qos import LATCHED
+
+NUMBERS = re.compile(r"[\d.]+")
+
+
+class Saying:
+    """Says what is new.
+
+    Args:
+        node: that says it.
+        topic: std_msgs/String, for late subscribers, too.
+        first: sentence.
+    """
+
+    def __init__(self, node: Node, topic: str, first: str) -> None:
+        self._node, self._said = node, ""
+        self._out = node.create_publisher(String, topic, LATCHED)
+        self(first)
+
+    def __call__(self, sentence: str) -> None:
+        """Say a sentence, if it differs from the last in more than its numbers: those change all the time."""
+        words = NUMBERS.sub("", sentence)
+        if words != self._said:
+            self._said = words
+            self._out.publish(String(data=sentence))
+            self._node.get_logger().info(sentence)

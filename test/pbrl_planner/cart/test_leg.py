@@ -1,0 +1,124 @@
+"""The table from a goal to its end."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from pbrl_planner.cart.leg import ENDED, Drove, Leg, LegState, Order
+from pbrl_planner.cart.query import Outcome
+from pbrl_planner.cart.settings import NavigationSettings
+
+SETTINGS = NavigationSettings(blocked=2.0, retry=2.0, retry_most=6.0, give_up=30.0)
+
+
+def driving() -> Leg:
+    leg = Leg(SETTINGS, 0.0)
+    assert leg.tick(0.0) is Order.PLAN
+    assert leg.planned(0.1, Outcome.FOUND, "4 s") is Order.FOLLOW
+    return leg
+
+
+def test_straight_to_the_goal() -> None:
+    leg = driving()
+    assert leg.state is LegState.DRIVING and leg.tick(9.0) is Order.NOTHING
+    assert leg.driving(1.0, 0.0, "") is Order.NOTHING and leg.sentence == "on the way"
+    assert leg.drove(Drove.ARRIVED, "") is Order.END and leg.state is LegState.ARRIVED
+    assert (leg.plans, leg.failures) == (1, 0)
+
+
+def test_one_question_at_a_time() -> None:
+    leg = Leg(SETTINGS, 0.0)
+    assert leg.tick(0.0) is Order.PLAN
+    assert {leg.tick(t) for t in (0.1, 5.0, 50.0)} == {Order.NOTHING}
+
+
+@pytest.mark.parametrize("outcome", [Outcome.NO_PATH, Outcome.GOAL_OCCUPIED, Outcome.UNDECIDED, Outcome.NOT_READY])
+def test_without_a_path_it_is_tried_again_until_patience_is_over(outcome: Outcome) -> None:
+    leg, now, times = Leg(SETTINGS, 0.0), 0.0, []
+    while leg.state not in ENDED:
+        if leg.tick(now) is Order.PLAN:
+            order = leg.planned(now, outcome, "why")
+            assert order is (Order.END if leg.state in ENDED else Order.FORGET)
+            times.append(now)
+        now += 0.5
+    assert leg.state is LegState.FAILED and leg.sentence == "no path for 36 s; why" and leg.failures == len(times)
+    assert np.diff(times).tolist() == [2.0, 4.0, 6.0, 6.0, 6.0, 6.0, 6.0], "less often as it lasts"
+
+
+@pytest.mark.parametrize("outcome", [Outcome.GOAL_OFF_MAP, Outcome.START_OFF_MAP])
+def test_what_no_patience_mends_ends_at_once(outcome: Outcome) -> None:
+    leg = Leg(SETTINGS, 0.0)
+    leg.tick(0.0)
+    assert leg.planned(0.1, outcome, "off") is Order.END and leg.sentence == "off"
+
+
+def test_who_is_shut_in_clears_first() -> None:
+    leg = Leg(SETTINGS, 0.0)
+    leg.tick(0.0)
+    assert leg.planned(0.1, Outcome.START_OCCUPIED, "") is Order.CLEAR
+    assert leg.tick(1.0) is Order.NOTHING and leg.tick(2.2) is Order.PLAN
+
+
+def test_before_something_it_looks_for_a_way_round_and_keeps_the_old_one() -> None:
+    leg = driving()
+    assert leg.driving(3.0, 1.9, "somebody") is Order.NOTHING and leg.sentence == "somebody"
+    assert leg.driving(3.1, 2.0, "somebody") is Order.PLAN
+    assert leg.driving(3.2, 2.1, "somebody") is Order.NOTHING
+    assert leg.planned(4.0, Outcome.NO_PATH, "none") is Order.FORGET and leg.state is LegState.DRIVING
+    assert leg.driving(5.9, 5.0, "somebody") is Order.NOTHING and leg.driving(6.0, 5.1, "somebody") is Order.PLAN
+    assert leg.planned(6.1, Outcome.FOUND, "") is Order.FOLLOW
+    assert leg.failures == 1 and leg.plans == 3
+
+
+def test_a_way_round_what_has_gone_meanwhile_is_not_taken() -> None:
+    leg = driving()
+    assert leg.driving(3.0, 2.0, "somebody") is Order.PLAN and leg.asked
+    leg.driving(4.0, 0.0, "")
+    assert leg.planned(4.1, Outcome.FOUND, "from where it stood") is Order.NOTHING
+    assert leg.state is LegState.DRIVING and not leg.asked
+
+
+def test_a_drive_that_is_given_up_is_planned_again() -> None:
+    leg = driving()
+    assert leg.drove(Drove.REPLAN, "too far off") is Order.CLEAR and leg.sentence == "too far off"
+    assert leg.tick(2.2) is Order.PLAN and leg.state is LegState.PLANNING
+
+
+@pytest.mark.parametrize("ended", [Drove.GRIP_LOST, Drove.REFUSED, Drove.STOPPED])
+def test_other_ends_of_a_drive_end_the_goal(ended: Drove) -> None:
+    leg = driving()
+    assert leg.drove(ended, "") is Order.END and leg.state is LegState.FAILED and leg.sentence == str(ended)
+
+
+def test_whatever_comes_after_the_end_changes_nothing() -> None:
+    leg = driving()
+    leg.drove(Drove.ARRIVED, "")
+    before = (leg.state, leg.sentence, leg.plans)
+    assert leg.planned(9.0, Outcome.FOUND, "x") is leg.drove(Drove.REPLAN, "y") is leg.tick(99.0) is Order.NOTHING
+    assert leg.driving(9.0, 9.0, "z") is Order.NOTHING and (leg.state, leg.sentence, leg.plans) == before
+
+
+def test_no_order_of_events_leaves_it_with_nothing_to_do_for_ever() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        leg, now, asked, driven = Leg(SETTINGS, 0.0), 0.0, False, False
+        for _ in itertools.count():
+            now += float(rng.uniform(0.1, 3.0))
+            order = Order.NOTHING
+            if asked and rng.random() < 0.5:
+                asked, order = False, leg.planned(now, rng.choice(list(Outcome)), "")
+            elif driven and rng.random() < 0.3:
+                driven, order = False, leg.drove(rng.choice(list(Drove)), "")
+            elif driven:
+                order = leg.driving(now, float(rng.uniform(0.0, 4.0)), "")
+            else:
+                order = leg.tick(now)
+            assert not (order is Order.PLAN and asked), "never two questions"
+            asked, driven = asked or order is Order.PLAN, driven or order is Order.FOLLOW
+            if order is Order.END:
+                assert leg.state in ENDED
+                break
+            assert now < 5000.0 and leg.state not in ENDED
