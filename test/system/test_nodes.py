@@ -55,7 +55,7 @@ def test_the_ament_index_leads_to_the_executable(package: str, executable: str) 
 
 
 @pytest.mark.parametrize(
-    "package", ["pbrl_msgs", "pbrl_config", "pbrl_description", "pbrl_bringup", *{name for name, _ in NODES}]
+    "package", ["pbrl_msgs", "pbrl_config", "pbrl_description", "pbrl_bringup", *sorted({name for name, _ in NODES})]
 )
 def test_every_package_is_in_the_index(package: str) -> None:
     prefix = get_packages_with_prefixes()[package]
