@@ -79,7 +79,7 @@ def test_done_can_still_be_reached_unless_it_is_ending(state: State) -> None:
     assert (State.DONE in reached(state, without=own)) != ending
 
 
-@pytest.mark.parametrize("state", ENDED)
+@pytest.mark.parametrize("state", sorted(ENDED))
 def test_an_end_stays_one_until_there_is_a_new_goal(state: State) -> None:
     assert own_events(state) == ()
     for event in INTERRUPTS:
