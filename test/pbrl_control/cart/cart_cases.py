@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pbrl_control.cart import CartBody, CartCommand, CartController, CartPercept, CartPlan, CartSettings
+from pbrl_control.cart import CartBody, CartCommand, CartController, CartLimits, CartPercept, CartPlan, CartSettings
 
 PHYSICS = 0.025  # [s]
 
@@ -151,3 +151,14 @@ def made(path: np.ndarray, settings: CartSettings = SETTINGS, **changes: object)
     """Make controller and world for a path."""
     plan = CartPlan.timed(path, settings.limits, settings.share)
     return CartController(plan, pr2_body(), settings), World(np.array(path[0]), **changes)
+
+
+def assert_within_limits(ticks: list[Tick], limits: CartLimits, dt: float = 0.05) -> None:
+    sent = np.array([np.zeros(4), *(tick.sent for tick in ticks)])
+    speeds = np.column_stack((np.hypot(sent[:, 0], sent[:, 1]), np.abs(sent[:, 2:])))
+    assert (speeds <= limits.speeds + 1e-9).all()
+    steps = np.diff(sent, axis=0)
+    changes = np.column_stack((np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2:])))
+    assert (changes <= limits.brakings * dt + 1e-9).all()
+    faster = np.diff(speeds, axis=0)
+    assert (faster <= limits.accelerations * dt + 1e-9).all()
