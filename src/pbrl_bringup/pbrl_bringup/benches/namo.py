@@ -77,7 +77,7 @@ def thesis_rooms(seed: int, count: int) -> Measured:
     for name, layout in layouts.items():
         seconds, moves = [], 0
         for number in range(count):
-            told, goal = draw_room(np.random.default_rng([seed, number]), layout)
+            told, goal, _ = draw_room(np.random.default_rng([seed, number]), layout)
             poses = {each: np.array(told.bodies[each].pose) for each in SIZES}
             took, made = timed(seen(layout, poses, np.array(told.robot.pose), goal), seed)
             seconds.append(took)

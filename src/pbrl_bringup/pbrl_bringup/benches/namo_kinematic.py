@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,7 +89,12 @@ def office_run(seed: int, number: int, count: int) -> Run:
 
 
 def find_way(
-    scene: NamoScene, truth: Mapping[str, ObjectModel], seed: int, settings: NamoSettings | None = None
+    scene: NamoScene,
+    truth: Mapping[str, ObjectModel],
+    seed: int,
+    settings: NamoSettings | None = None,
+    believed: Mapping[str, ObjectBelief] | None = None,
+    seeds: Callable[[int], int] | None = None,
 ) -> Run:
     """Plan and carry out manipulations until the goal can be driven to, or is said to be out of reach.
 
@@ -98,15 +103,17 @@ def find_way(
         truth: what each thing is, of which the planner knows nothing.
         seed: of beliefs and plans.
         settings: of the planner.
+        believed: of each thing before it was moved; None: drawn.
+        seeds: seed of the plan after so many manipulations; None: counted up from `seed`.
     """
-    first, beliefs = scene, prior_beliefs(scene, seed, settings)
+    first, beliefs = scene, dict(prior_beliefs(scene, seed, settings) if believed is None else believed)
     seconds: list[float] = []
     been: dict[str, list[Array]] = {}
     moves = failed = 0
     unwilling: list[str] = []
     while moves < MOST * len(scene.movable):
         began = time.perf_counter()
-        made = plan(scene, beliefs, seed + moves, settings, been)
+        made = plan(scene, beliefs, seed + moves if seeds is None else seeds(moves), settings, been)
         seconds.append(time.perf_counter() - began)
         if made.drive or made.chosen is None or made.chosen.plan is None:
             end = _end(first, made, truth)

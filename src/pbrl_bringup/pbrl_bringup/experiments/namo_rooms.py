@@ -22,8 +22,11 @@ from bullet_sim.settings import parse_settings
 from pbrl_bringup.benches.namo_kinematic import REACHED, find_way, true_models
 from pbrl_bringup.errors import BringupError
 from pbrl_control.navigation.footprint import KRANG_STOWED
+from pbrl_namo.executive.mission import job_seed
+from pbrl_namo.planner import NamoSettings
 from pbrl_namo.regions.free_space import drive_radius, free_space
 from pbrl_namo.scene import Movable, NamoScene
+from pbrl_namo.thinking import unlearned
 
 Array = NDArray[np.float64]
 
@@ -42,6 +45,8 @@ ONE_NEAR = (("rear_left",), ("rear_right",))
 grasp: of those rooms none is solved."""
 DRAWS = 200
 """Of a room, until one is closed by its tables."""
+JOBS = 3
+"""Of a mission for each manipulation that surprises: a plan, a grasp, what is learned."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ TURNED = Layout(2.45, {SQUARE: (2.6, 1.05), LONG: (2.6, -1.15)}, {SQUARE: HELD, 
 """Of 6.5.2: the square table is stuck, the long one has room to turn about a locked caster."""
 
 
-def draw_room(rng: np.random.Generator, layout: Layout) -> tuple[Scene, Array]:
+def draw_room(rng: np.random.Generator, layout: Layout) -> tuple[Scene, Array, int]:
     """Draw a room.
 
     Args:
@@ -81,7 +86,7 @@ def draw_room(rng: np.random.Generator, layout: Layout) -> tuple[Scene, Array]:
         layout: of the room.
 
     Returns:
-        The simulator's scene, and the goal (3,), of any heading [m, rad].
+        The simulator's scene, the goal (3,), of any heading [m, rad], and the seed of the mission it was drawn for.
 
     Raises:
         BringupError: none of the draws is closed.
@@ -97,7 +102,8 @@ def draw_room(rng: np.random.Generator, layout: Layout) -> tuple[Scene, Array]:
         if not closed(scene):
             continue
         concealed = {name: list(sets[int(rng.integers(len(sets)))]) for name, sets in layout.locked.items()}
-        if not layout.surprises or _surprising(scene, concealed, int(rng.integers(2**31))):
+        seed = int(rng.integers(2**31))
+        if not layout.surprises or _surprising(scene, concealed, seed):
             break
     else:
         raise BringupError(f"room: expected one of {DRAWS} draws to be closed by its tables, none was")
@@ -118,7 +124,7 @@ def draw_room(rng: np.random.Generator, layout: Layout) -> tuple[Scene, Array]:
         "bodies": bodies,
         "concealed": {"locked_casters": concealed},
     }
-    return parse_settings(told, Scene, "the thesis's room"), goal
+    return parse_settings(told, Scene, "the thesis's room"), goal, seed
 
 
 def outline_of(name: str) -> Array:
@@ -148,7 +154,16 @@ def closed(scene: NamoScene) -> bool:
 
 
 def _surprising(scene: NamoScene, locked: Mapping[str, Sequence[str]], seed: int) -> bool:
-    """Tell whether each table with locked casters refuses once in a kinematic world, and then a way is found."""
+    """Tell whether each table with locked casters refuses once in a kinematic world, and then a way is found.
+
+    Planned is as the mission of that seed plans, from what it believes at first: who plans for worlds among which there
+    are locked casters may choose, by chance, a motion that the truly locked one allows, and is not surprised.
+    """
     hidden = {name: {"mass": MASSES[name], "locked_casters": locked.get(name, ())} for name in scene.movable}
-    run = find_way(scene, true_models(scene, hidden), seed)
+    believed = {name: unlearned(thing, NamoSettings()) for name, thing in scene.movable.items()}
+
+    def seeds(moves: int) -> int:
+        return job_seed(seed, 1 + JOBS * moves)
+
+    run = find_way(scene, true_models(scene, hidden), seed, believed=believed, seeds=seeds)
     return run.end == REACHED and sorted(run.refused) == sorted(locked)

@@ -67,8 +67,7 @@ def trial(seed: int, number: int, layout: Layout, folder: Path) -> NamoOutcome:
 
     def run() -> NamoOutcome:
         rng = np.random.default_rng([seed, number])
-        scene, goal = draw_room(rng, layout)
-        return run_namo(scene, goal, int(rng.integers(2**31)))
+        return run_namo(*draw_room(rng, layout))
 
     told = {"seed": seed, "number": number, "half_width": layout.half_width, "surprises": layout.surprises}
     return kept_run(folder / f"{number:02d}.json", told, run)
@@ -87,7 +86,7 @@ def measured(seed: int, quick: bool, out: Path, layout: Layout, thesis: Told) ->
     count = 1 if quick else RUNS
     runs = in_parallel(trial, [(seed, k, layout, out / RUNS_KEPT) for k in range(count)], "rooms")
     shown = max(range(count), key=lambda k: runs[k].reached + _as_told(runs[k]))
-    scene, _ = draw_room(np.random.default_rng([seed, shown]), layout)
+    scene, *_ = draw_room(np.random.default_rng([seed, shown]), layout)
     draw(runs[shown], out, braked=braked(scene))
     return Measured(rows_of(runs, thesis), {"runs": [told(run) for run in runs]})
 
