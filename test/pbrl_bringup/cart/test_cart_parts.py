@@ -11,8 +11,8 @@ import pytest
 from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
 from pbrl_bringup.cart_run import AHEAD, RETRY, RETRY_MOST, CartRun, onward, rest
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.experiments.cart_kept import keep_leg, read_leg
 from pbrl_bringup.experiments.cart_office import route, rows_of
+from pbrl_bringup.experiments.kept import keep_run, read_run
 from pbrl_control.cart import CartBody, CartCommand, Cause, DriveStatus
 from pbrl_control.cart.whereabouts import Whereabouts
 from pbrl_control.planar import compose, inverse, wrap
@@ -187,15 +187,15 @@ def test_rows_tell_proved_failures_from_others() -> None:
 
 def test_a_kept_leg_comes_back_and_another_is_refused(tmp_path) -> None:
     file, told = tmp_path / "legs" / "leg_000.json", {"seed": 1, "leg": 0}
-    assert read_leg(file, told) is None
+    assert read_run(CartOutcome, file, told) is None
     made = leg(call(Answer.PLAN), call(Answer.NO_PATH, None))
-    keep_leg(file, told, made)
-    assert read_leg(file, told) == made
-    with pytest.raises(BringupError, match="expected a leg of"):
-        read_leg(file, {"seed": 2, "leg": 0})
+    keep_run(file, told, made)
+    assert read_run(CartOutcome, file, told) == made
+    with pytest.raises(BringupError, match="expected a run of"):
+        read_run(CartOutcome, file, {"seed": 2, "leg": 0})
     file.write_text("{}", encoding="utf-8")
     with pytest.raises(BringupError, match="remove it"):
-        read_leg(file, told)
+        read_run(CartOutcome, file, told)
 
 
 class Deaf:

@@ -44,7 +44,7 @@ from pbrl_namo.executive import (
     State,
 )
 from pbrl_namo.executive.settings import JobSettings, ReleaseSettings
-from pbrl_namo.executive.table import ENDED, MOVING, Event
+from pbrl_namo.executive.table import ENDED, MOVING
 from pbrl_namo.executive.view import RoomView
 from pbrl_namo.executive.ways import find_grasp, find_way
 from pbrl_namo.regions import free_space, region_of
@@ -339,38 +339,3 @@ def view_of(world: Office, seconds: float = 0.6) -> RoomView:
 
 def tag(time: float, position: np.ndarray, yaw: float) -> Tag:
     return Tag(time, position, np.array([0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)]))
-
-
-def events(executive: NamoExecutive) -> list[Event]:
-    return [change.event for change in executive.mission.account.log]
-
-
-def once(world: Office, state: State, act: Callable[[], None], after: float = 0.0) -> None:
-    """Do something once, so long after a state was entered for the first time."""
-    since: list[float] = []
-
-    def happens(world: Office) -> None:
-        if world.states[-1] == state and not since:
-            since.append(world.time)
-        if since and world.time >= since[0] + after - 1e-9:
-            world.happens = lambda world: None  # type: ignore[assignment,misc]
-            act()
-
-    world.happens = happens  # type: ignore[assignment]
-
-
-def hide(world: Office, *names: str) -> None:
-    world.tamper = lambda _, percept: replace(
-        percept, tags={name: each for name, each in percept.tags.items() if name not in names}
-    )
-
-
-def freeze(world: Office, *names: str) -> None:
-    """Show these tags as they are now for ever."""
-    old = {name: world.percept().tags[name] for name in names}
-    world.tamper = lambda _, percept: replace(percept, tags={**percept.tags, **old})
-
-
-def known(move: Move) -> Move:
-    """Return a move with a model of what is moved, as far as anybody knows."""
-    return replace(move, model=light())

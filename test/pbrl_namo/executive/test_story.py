@@ -6,19 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from office_of_fakes import (
-    DT,
-    GOAL,
-    SETTINGS,
-    Brain,
-    Office,
-    events,
-    executive_in,
-    known,
-    office,
-    once,
-)
+from office_of_fakes import DT, GOAL, SETTINGS, Brain, Office, executive_in, office
 from room_of_fakes import NOMINAL
+from tampering import events, known, once
 
 from pbrl_control.kinematics import RobotKinematics
 from pbrl_control.loop import ControlLoop

@@ -7,18 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from office_of_fakes import (
-    GOAL,
-    SETTINGS,
-    Brain,
-    Office,
-    events,
-    executive_in,
-    freeze,
-    office,
-    once,
-)
+from office_of_fakes import GOAL, SETTINGS, Brain, Office, executive_in, office
 from room_of_fakes import NOMINAL
+from tampering import events, freeze, once
 
 from pbrl_control.errors import ControlError
 from pbrl_control.kinematics import RobotKinematics

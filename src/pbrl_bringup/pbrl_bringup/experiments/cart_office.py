@@ -19,8 +19,8 @@ from bullet_sim.settings import parse_settings
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.cart.outcome import CartOutcome
 from pbrl_bringup.cart_run import run_cart
-from pbrl_bringup.experiments.cart_kept import keep_leg, read_leg
 from pbrl_bringup.experiments.cart_office_figure import draw
+from pbrl_bringup.experiments.kept import keep_run, read_run
 from pbrl_bringup.parallel import in_parallel
 from pbrl_control.planar import Array, compose
 from pbrl_planner.cart.navigator import PROVED
@@ -145,11 +145,11 @@ def driven(legs: Sequence[Leg], seed: int, longest: float, out: Path) -> list[Ca
     jobs = [
         (leg, seed, longest, path)
         for leg, path in zip(legs, paths, strict=True)
-        if read_leg(path, leg.told(seed, longest)) is None
+        if read_run(CartOutcome, path, leg.told(seed, longest)) is None
     ]
     if jobs:
         in_parallel(drive, jobs, "legs")
-    done = [read_leg(path, leg.told(seed, longest)) for leg, path in zip(legs, paths, strict=True)]
+    done = [read_run(CartOutcome, path, leg.told(seed, longest)) for leg, path in zip(legs, paths, strict=True)]
     return [each for each in done if each is not None]
 
 
@@ -157,7 +157,7 @@ def drive(leg: Leg, seed: int, longest: float, path: Path) -> None:
     """Drive a leg and keep it."""
     scene = scene_of(load_office(leg.office), np.array(leg.start))
     drawn = int(np.random.default_rng([seed, leg.number, 2]).integers(2**31))
-    keep_leg(path, leg.told(seed, longest), run_cart(scene, np.array(leg.goal), drawn, longest))
+    keep_run(path, leg.told(seed, longest), run_cart(scene, np.array(leg.goal), drawn, longest))
 
 
 def scene_of(office: OfficeScene, start: Array) -> OfficeScene:

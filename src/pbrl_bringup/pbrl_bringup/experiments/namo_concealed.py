@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from pbrl_bringup.benches.rows import Measured, Row, at_least
+from pbrl_bringup.experiments.kept import kept_run
 from pbrl_bringup.experiments.namo_concealed_rooms import KINDS, Concealing, draw_concealing
 from pbrl_bringup.experiments.namo_figure import draw
-from pbrl_bringup.experiments.namo_kept import kept_run
 from pbrl_bringup.experiments.namo_trials import RUNS_KEPT
 from pbrl_bringup.namo_run import NamoOutcome, run_namo
 from pbrl_bringup.parallel import in_parallel
@@ -73,7 +73,7 @@ def trial(seed: int, number: int, ask: bool, folder: Path) -> NamoOutcome:
         return run_namo(room.scene, room.goal, room.seed, ExecutiveSettings(ask_mismatch=ask), longest=LONGEST)
 
     who = "asked" if ask else "plain"
-    return kept_run(folder / f"{number:02d}_{who}.json", {"seed": seed, "number": number, "ask": ask}, run)
+    return kept_run(NamoOutcome, folder / f"{number:02d}_{who}.json", {"seed": seed, "number": number, "ask": ask}, run)
 
 
 def measure(seed: int, quick: bool, out: Path) -> Measured:

@@ -14,8 +14,8 @@ import numpy as np
 from bullet_sim.catalogue import OfficeTable
 from bullet_sim.scene import Scene
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
+from pbrl_bringup.experiments.kept import kept_run
 from pbrl_bringup.experiments.namo_figure import draw
-from pbrl_bringup.experiments.namo_kept import kept_run
 from pbrl_bringup.experiments.namo_rooms import LONG, SQUARE, Layout, draw_room
 from pbrl_bringup.namo_run import NamoOutcome, run_namo
 from pbrl_bringup.parallel import in_parallel
@@ -70,7 +70,7 @@ def trial(seed: int, number: int, layout: Layout, folder: Path) -> NamoOutcome:
         return run_namo(*draw_room(rng, layout))
 
     told = {"seed": seed, "number": number, "half_width": layout.half_width, "surprises": layout.surprises}
-    return kept_run(folder / f"{number:02d}.json", told, run)
+    return kept_run(NamoOutcome, folder / f"{number:02d}.json", told, run)
 
 
 def measured(seed: int, quick: bool, out: Path, layout: Layout, thesis: Told) -> Measured:

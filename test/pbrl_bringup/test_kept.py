@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.experiments.namo_kept import kept_run
+from pbrl_bringup.experiments.kept import kept_run
 from pbrl_bringup.namo_run import Moment, NamoOutcome
 
 TOLD = {"seed": 3, "number": 1}
@@ -27,15 +27,15 @@ def never() -> NamoOutcome:
 
 def test_a_run_is_made_once_and_comes_back_as_it_was(tmp_path: Path) -> None:
     path = tmp_path / "runs/01.json"
-    assert kept_run(path, TOLD, outcome) == outcome()
-    assert kept_run(path, TOLD, never) == outcome()
+    assert kept_run(NamoOutcome, path, TOLD, outcome) == outcome()
+    assert kept_run(NamoOutcome, path, TOLD, never) == outcome()
 
 
 def test_a_run_of_something_else_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "01.json"
-    kept_run(path, TOLD, outcome)
+    kept_run(NamoOutcome, path, TOLD, outcome)
     with pytest.raises(BringupError, match=r"expected a run of .*'seed': 4.*remove the folder"):
-        kept_run(path, {**TOLD, "seed": 4}, never)
+        kept_run(NamoOutcome, path, {**TOLD, "seed": 4}, never)
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"told": {}}', '{"told": {}, "outcome": {"state": 3}}'])
@@ -43,4 +43,4 @@ def test_a_damaged_file_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "01.json"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(BringupError, match="expected a run that was kept"):
-        kept_run(path, TOLD, never)
+        kept_run(NamoOutcome, path, TOLD, never)
