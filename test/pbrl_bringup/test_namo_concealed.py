@@ -25,7 +25,8 @@ from pbrl_bringup.experiments.namo_figure import draw
 from pbrl_bringup.namo_run import Moment, NamoOutcome
 from pbrl_namo.executive import State
 from pbrl_namo.executive.mission import job_seed
-from pbrl_namo.planner import NamoSettings, plan
+from pbrl_namo.planner import plan
+from pbrl_namo.settings import NamoSettings
 from pbrl_namo.thinking import unlearned
 
 EFFECTS = {CARPET: "floor_patch", TETHER: "tether", UNSEEN: "unseen_body"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,14 +11,16 @@ import shapely
 
 from pbrl_control.constraints.classes import ModelClass
 from pbrl_control.planar import compose, inverse
+from pbrl_namo import planner
 from pbrl_namo.beliefs import ObjectBelief, belief_of_draws
 from pbrl_namo.errors import NamoError
 from pbrl_namo.manipulation import ManipulationSettings
 from pbrl_namo.mdp import MdpSettings
-from pbrl_namo.planner import NamoPlan, NamoSettings, plan, prior_beliefs
+from pbrl_namo.planner import NamoPlan, plan, prior_beliefs
 from pbrl_namo.regions import free_space
 from pbrl_namo.scene import Movable, NamoScene
 from pbrl_namo.scenes import random_office
+from pbrl_namo.settings import LastResortSettings, NamoSettings
 
 QUICK = NamoSettings(manipulation=ManipulationSettings(worlds=20))
 
@@ -253,6 +256,39 @@ def test_all_estimates_lead_to_the_same_choice_as_those_needed() -> None:
     assert whole.policy is not None
     assert needed.start is not None
     assert needed.policy.values[needed.start] == pytest.approx(whole.policy.values[needed.start])
+
+
+def test_what_is_hard_to_find_is_found_before_a_goal_is_given_up() -> None:
+    scene = random_office(10, np.random.default_rng([0, 10, 4]), move_needed=True)
+    hasty = QUICK.model_copy(update={"last_resort": LastResortSettings(margins=())})
+    given_up = plan(scene, beliefs_of(scene), 0, hasty)
+    assert given_up.chosen is None and given_up.reason
+    found = plan(scene, beliefs_of(scene), 0, QUICK)
+    assert moved_next(found) in scene.movable
+    assert found.reason == ""
+    assert found.seconds["manipulation"] > given_up.seconds["manipulation"]
+
+
+def test_behind_a_wall_nothing_is_looked_for_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, asked = room(), []
+    scene = replace(plain, fixed={"wall": shapely.Polygon(box(0.1, 4.0, 4.2, 2.0))})
+    build = planner.build_roadmap
+    monkeypatch.setattr(planner, "build_roadmap", lambda *given: asked.append(given) or build(*given))
+    assert plan(scene, beliefs_of(scene), 0, QUICK).chosen is None
+    assert len(asked) == 1
+
+
+def test_harder_is_never_less_and_one_step_stays_one() -> None:
+    told = NamoSettings(manipulation=ManipulationSettings(grasps=90, step_spacing=0.01, steps=1))
+    first, second = told.harder()
+    assert first.manipulation.grasps == 90
+    assert first.manipulation.step_spacing == 0.01
+    assert first.manipulation.steps == 1
+    assert first.manipulation.second_grasps > told.manipulation.second_grasps
+    assert first.manipulation.motion == told.manipulation.motion
+    assert second.manipulation.motion.clearance == told.manipulation.motion.clearance / 2.0
+    assert set(told.manipulation.radii) < set(first.manipulation.radii)
+    assert NamoSettings().harder()[0].manipulation.steps > NamoSettings().manipulation.steps
 
 
 def test_what_each_part_took_is_told() -> None:

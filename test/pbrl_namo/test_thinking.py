@@ -28,8 +28,8 @@ from pbrl_namo.errors import NamoError
 from pbrl_namo.executive import Move, PlanJob, Refused
 from pbrl_namo.executive.jobs import GraspAnswer, GraspJob, LearnAnswer, LearnJob, MismatchAnswer, MismatchJob, finite
 from pbrl_namo.manipulation import ManipulationSettings
-from pbrl_namo.planner import NamoSettings
 from pbrl_namo.scene import Movable, NamoScene
+from pbrl_namo.settings import NamoSettings
 from pbrl_namo.thinking import Thoughts
 
 QUICK = NamoSettings(manipulation=ManipulationSettings(worlds=20))
@@ -197,7 +197,18 @@ def test_what_a_model_class_cannot_explain_is_said(pinned: Recording) -> None:
     answer = free(LearnJob("table", 2.0, 6.0, None, 3))
     assert isinstance(answer, LearnAnswer)
     assert not answer.explained
-    assert answer.reason.startswith(thinking.UNEXPLAINED)
+    assert answer.reason.startswith(thinking.LEFT_OUT)
+
+
+def test_a_left_out_force_that_stops_no_push_is_no_reason_to_ask(
+    monkeypatch: pytest.MonkeyPatch, pinned: Recording
+) -> None:
+    """20 N of 51 N: by a robot that is not stopped by half of what it feels, it need not be explained."""
+    monkeypatch.setattr(thinking, "MATTERS", 0.5)
+    free = Thoughts(lambda begin, end: pinned, QUICK, QUICK_FIT.model_copy(update={"model_class": "free"}))
+    answer = free(LearnJob("table", 2.0, 6.0, None, 3))
+    assert isinstance(answer, LearnAnswer)
+    assert answer.explained
 
 
 @pytest.mark.parametrize("kind", [LearnJob, MismatchJob])

@@ -28,7 +28,7 @@ from pbrl_namo.executive.opening_check import OpenByFreeSpace
 from pbrl_namo.executive.settings import ExecutiveSettings
 from pbrl_namo.executive.table import ENDED, State
 from pbrl_namo.executive.thinker import ImmediateThinker
-from pbrl_namo.planner import NamoSettings
+from pbrl_namo.settings import NamoSettings
 from pbrl_namo.thinking import Thoughts
 from pbrl_namo.warming import compile_kernels
 

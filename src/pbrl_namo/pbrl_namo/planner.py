@@ -8,19 +8,17 @@ manipulation, and whenever a belief changes, everything is planned anew.
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Self, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import shapely
-from pydantic import model_validator
 
 from pbrl_control.planar import Array
-from pbrl_control.settings import Section
 from pbrl_namo.beliefs.belief import ObjectBelief, prior_belief
-from pbrl_namo.beliefs.settings import BeliefSettings
 from pbrl_namo.errors import NamoError
 from pbrl_namo.manipulation.cost import best_reward
 from pbrl_namo.manipulation.estimate import estimate_prepared
@@ -30,40 +28,17 @@ from pbrl_namo.manipulation.settings import ManipulationSettings
 from pbrl_namo.manipulation.study import Study
 from pbrl_namo.manipulation.yard import Yard
 from pbrl_namo.mdp.expansion import expand
-from pbrl_namo.mdp.settings import MdpSettings
 from pbrl_namo.mdp.value_iteration import Policy
 from pbrl_namo.regions.free_space import FreeSpace, drive_radius, free_space
 from pbrl_namo.regions.openings import Opening, closers, cut_off, openings
 from pbrl_namo.regions.roadmap import Roadmap, build_roadmap
-from pbrl_namo.regions.settings import RegionSettings
 from pbrl_namo.regions.standing_room import StandingRoom, standing_room
 from pbrl_namo.regions.whereabouts import region_of
 from pbrl_namo.scene import NamoScene
+from pbrl_namo.settings import NamoSettings
 
 Result = TypeVar("Result")
 TOLD = 6  # openings of which the reason says why they cannot be made
-
-
-class NamoSettings(Section):
-    """Everything that can be set about planning.
-
-    Attributes:
-        regions: free space, roadmap and grasp samples.
-        beliefs: what furniture is like before it was pushed.
-        manipulation: Monte-Carlo manipulation.
-        mdp: the upper level.
-    """
-
-    regions: RegionSettings = RegionSettings()
-    beliefs: BeliefSettings = BeliefSettings()
-    manipulation: ManipulationSettings = ManipulationSettings()
-    mdp: MdpSettings = MdpSettings()
-
-    @model_validator(mode="after")
-    def _one_gripper(self) -> Self:
-        if self.regions.grasp != self.manipulation.grasping:
-            raise ValueError("expected regions.grasp and manipulation.grasping alike; they are of the same grippers")
-        return self
 
 
 @dataclass(frozen=True)
@@ -122,6 +97,8 @@ def plan(
 ) -> NamoPlan:
     """Plan what to move next; same seed, same plan.
 
+    Where nothing helps, it is looked for harder (`NamoSettings.last_resort`), unless walls alone cut the goal off.
+
     Args:
         scene: what is known of the room, now.
         beliefs: of everything movable that may have to be moved.
@@ -134,6 +111,37 @@ def plan(
         NamoError: nothing is believed of a thing that could be moved, or a belief is not of it.
     """
     settings = settings or NamoSettings()
+    first = made = _plan(scene, beliefs, seed, settings, been or {})
+    seconds = Counter(first.seconds)
+    for harder in settings.harder() if _in_vain(first) and _joined_without_things(scene, first) else ():
+        made = _plan(scene, beliefs, seed, harder, been or {})
+        seconds.update(made.seconds)
+        if made.chosen is not None:
+            break
+    return replace(first if made.chosen is None else made, seconds=dict(seconds))
+
+
+def _in_vain(made: NamoPlan) -> bool:
+    """Say whether a plan found nothing to do though start and goal are regions."""
+    return not made.drive and made.chosen is None and made.start is not None and made.goal is not None
+
+
+def _joined_without_things(scene: NamoScene, made: NamoPlan) -> bool:
+    """Say whether start and goal would be in one region if everything movable were gone."""
+    bare = free_space(scene, made.free.radius, leave_out=tuple(scene.movable))
+    inside = [made.free.regions[k].point_on_surface() for k in (made.start, made.goal) if k is not None]
+    start, goal = bare.indices(shapely.get_coordinates(inside))
+    return bool(start == goal)
+
+
+def _plan(
+    scene: NamoScene,
+    beliefs: Mapping[str, ObjectBelief],
+    seed: int,
+    settings: NamoSettings,
+    been: Mapping[str, Sequence[Array]],
+) -> NamoPlan:
+    """Plan once."""
     clock = _Clock()
     radius = settings.regions.radius
     size = drive_radius(scene.robot, settings.regions.margin) if radius is None else radius
@@ -148,7 +156,7 @@ def plan(
     roadmap = clock("roadmap", lambda: build_roadmap(scene, np.random.default_rng([seed, 0]), settings.regions))
     found = clock("openings", lambda: _left(scene, free, openings(scene, free, roadmap)))
     away = cut_off(free, found, start)
-    maker = _Maker(scene, free, roadmap, beliefs, seed, settings.manipulation, clock, been or {})
+    maker = _Maker(scene, free, roadmap, beliefs, seed, settings.manipulation, clock, been)
     if goal in away:
         made_room = maker.make_room(start, goal)
         if made_room is not None:

@@ -24,7 +24,7 @@ from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.online.slices import BEFORE, between
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_model.errors import ModelError
-from pbrl_model.fitting.fit import fit_recording
+from pbrl_model.fitting.fit import ObjectFit, fit_recording
 from pbrl_model.fitting.options import FitOptions
 from pbrl_model.parameters import KERNEL_COLUMNS
 from pbrl_namo.beliefs.belief import ObjectBelief, belief_of_draws, prior_belief
@@ -46,9 +46,10 @@ from pbrl_namo.executive.jobs import (
 )
 from pbrl_namo.executive.ways import find_grasp, find_way
 from pbrl_namo.manipulation.plan import ManipulationPlan
-from pbrl_namo.planner import NamoPlan, NamoSettings, plan
+from pbrl_namo.planner import NamoPlan, plan
 from pbrl_namo.regions.free_space import drive_radius
 from pbrl_namo.scene import Movable, NamoScene
+from pbrl_namo.settings import NamoSettings
 
 Recorded = Callable[[float, float], Recording]
 """Gives what was recorded between two times on the recording's clock [s]."""
@@ -148,7 +149,7 @@ class Thoughts:
         except (BagError, ModelError, NamoError) as error:
             return Refused(_line(error))
         met = _met(recording, job.object)
-        unexplained = [note for note in found.notes if note.startswith(UNEXPLAINED)]
+        unexplained = [note for note in found.notes if note.startswith(_faults(found))]
         unexplained += [] if met is None else [f"it {met.told()}"]
         belief = replace(belief, stops=_stops(job))
         return LearnAnswer(belief, not unexplained, "; ".join(unexplained), time.perf_counter() - begun)
@@ -209,8 +210,18 @@ def _stopped(belief: ObjectBelief, job: LearnJob, met: Encounter) -> ObjectBelie
     return replace(belief, stops=(*_stops(job), replace(stop, level=level)))
 
 
-UNEXPLAINED = ("something that this model class does not have", "no parameters that the prior allows explain")
-"""How notes of a fit begin that say that it does not explain the recording."""
+LEFT_OUT, UNEXPLAINED = "something that this model class does not have", "no parameters that the prior allows explain"
+"""How notes of a fit begin that say that it leaves a force out, or does not explain the motion."""
+MATTERS = 0.25
+"""Share of the greatest force on a thing, from which on a force that its model leaves out matters: a push is stopped at
+half as much again as is expected. Casters that are dragged leave out a tenth."""
+
+
+def _faults(found: ObjectFit) -> tuple[str, ...]:
+    """Return how those notes of a fit begin that are a reason to ask what it leaves out."""
+    felt = max(float(np.hypot(*motion.wrench[:, :2].T).max()) for motion in found.motions)
+    left_out = float(np.median(found.noise[..., 1]))
+    return (UNEXPLAINED, LEFT_OUT) if left_out > MATTERS * felt else (UNEXPLAINED,)
 
 
 def _wider(scene: NamoScene, settings: NamoSettings, wider: float) -> NamoSettings:

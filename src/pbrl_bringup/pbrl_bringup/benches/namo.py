@@ -23,12 +23,13 @@ from pbrl_bringup.experiments.namo_rooms import SIZES, STUCK, TURNED, draw_room,
 from pbrl_bringup.parallel import in_parallel
 from pbrl_bringup.paths import workspace
 from pbrl_control.navigation.footprint import KRANG_STOWED
-from pbrl_namo.planner import NamoPlan, NamoSettings, plan, prior_beliefs
+from pbrl_namo.planner import NamoPlan, plan, prior_beliefs
 from pbrl_namo.regions.free_space import free_space
 from pbrl_namo.regions.settings import MARGIN, RegionSettings
 from pbrl_namo.scene import NamoScene
 from pbrl_namo.scenes import load_svg, random_office
 from pbrl_namo.scenes.hidden import nominal_mass
+from pbrl_namo.settings import NamoSettings
 
 ROOMS = 20
 PLANNING = 2.0

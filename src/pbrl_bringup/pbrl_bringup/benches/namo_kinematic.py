@@ -27,10 +27,11 @@ from pbrl_namo.beliefs.belief import ObjectBelief
 from pbrl_namo.manipulation.plan import ManipulationPlan
 from pbrl_namo.manipulation.plane_kernel import moved
 from pbrl_namo.manipulation.settings import ManipulationSettings
-from pbrl_namo.planner import NamoPlan, NamoSettings, plan, prior_beliefs
+from pbrl_namo.planner import NamoPlan, plan, prior_beliefs
 from pbrl_namo.scene import NamoScene
 from pbrl_namo.scenes import draw_hidden, random_office
 from pbrl_namo.scenes.hidden import CASTERS
+from pbrl_namo.settings import NamoSettings
 
 ROLLING, TREAD, INSET = 0.02, 0.7, 0.06
 """Friction coefficient of a thing whose casters roll, and of a locked one's tread; how far casters are inwards [m]."""

@@ -9,8 +9,9 @@ force, and things that it could move are as good as gone.
    everything else gone, the goal is out of reach.
 2. *What only turns.* Something that start and goal are apart by, all else gone that can be moved, and that is free only
    to turn about a point, has one coordinate. All angles are visited that it can be brought to, in as many grasps as it
-   takes, with all sides of it that the robot can come to on the way. If from none of them the goal can be reached, it
-   is out of reach.
+   takes, with all sides of it that the robot can come to on the way. At first only what can be moved before it is gone;
+   then also what can be grasped from a place come to on the way, and all angles are visited anew. If from none of them
+   the goal can be reached, it is out of reach.
 
 What neither proves is taken to be within reach. So "wrongly said to be out of reach" may still be said of a room in
 which nothing helps; the other way round only by the resolution: grasps every few centimetres, angles every few degrees.
@@ -97,18 +98,20 @@ class Proof:
         return any(
             self._freedoms[name].model_class == ModelClass.FIXED_POINT
             and not self._joined(gone - {name})
-            and not self._turned(name, gone)
+            and not self._turned(name)
             for name in sorted(gone)
         )
 
-    def _movable(self) -> set[str]:
-        """Return what can ever be moved, at most."""
+    def _movable(self, stays: str = "") -> set[str]:
+        """Return what can ever be moved, at most, while one thing stays where it is."""
         gone: set[str] = set()
         while True:
             bare, free = self._without(gone)
             region = free.regions[region_of(bare, free, bare.start)]
             more = {
-                name for name in bare.movable if len(self._freedoms[name].moves) and self._moves(bare, name, region)
+                name
+                for name in bare.movable
+                if name != stays and len(self._freedoms[name].moves) and self._moves(bare, name, region)
             }
             if not more:
                 return gone
@@ -123,17 +126,40 @@ class Proof:
             return len(grasps) > 0  # what is free goes back at least, as the robot came
         return bool((self._went(roller, name, pose, grasps) > LEAST).any())
 
-    def _turned(self, name: str, gone: Collection[str]) -> bool:
-        """Say whether the goal can be reached past a thing that only turns, all else gone."""
-        bare, free = self._without(set(gone) - {name})
+    def _turned(self, name: str) -> bool:
+        """Say whether the goal can be reached past a thing that only turns."""
+        gone = self._movable(stays=name)
+        while True:
+            reached, parts = self._visited(name, gone)
+            if reached:
+                return True
+            bare, _ = self._without(gone | {name})
+            more = {
+                other
+                for other in bare.movable
+                if len(self._freedoms[other].moves) and any(self._held_from(bare, other, part) for part in parts)
+            }
+            if not more:
+                return False
+            gone |= more
+
+    def _visited(self, name: str, gone: Collection[str]) -> tuple[bool, list[shapely.Polygon]]:
+        """Say whether the goal can be reached past a thing that only turns, all else gone; else from where it cannot.
+
+        Returns:
+            Whether it can; the parts of the floor that the robot can come to. Where nothing can be said, it can.
+        """
+        bare, free = self._without(set(gone))
         turn = Turn(bare, free, name, self._freedoms[name].moves[0])
         pieces, roller = self._prepared(bare, name)
         stances = self._grasps(name)
         begun = turn.side(0, bare.start[:2])
         if begun is None:
-            return True  # the robot stands where the disc has no room: nothing is proved
+            return True, []  # the robot stands where the disc has no room: nothing is proved
         waiting = [(0, begun)]
         seen = set(waiting)
+        if turn.parts(0)[begun].intersects(turn.goal):
+            return True, []
         while waiting:
             k, side = waiting.pop()
             grasps = stances.free_ones(turn.pose(k), turn.parts(k)[side], pieces)
@@ -146,11 +172,16 @@ class Proof:
                     other = (k + sign * steps) % AROUND
                     sides = turn.sides(other, leaves[went[row] >= steps * ANGLE])
                     if any(turn.parts(other)[each].intersects(turn.goal) for each in sides):
-                        return True
+                        return True, []
                     new = {(other, each) for each in sides} - seen
                     seen |= new
                     waiting += sorted(new)
-        return False
+        return False, [turn.parts(k)[side] for k, side in sorted(seen)]
+
+    def _held_from(self, scene: NamoScene, name: str, part: shapely.Polygon) -> bool:
+        """Say whether a thing of a scene can be grasped from a part of the floor."""
+        pieces, _ = self._prepared(scene, name)
+        return bool(self._grasps(name).free(np.array(scene.poses[name], dtype=float), part, pieces).any())
 
     def _went(self, roller: Roller, name: str, pose: Array, grasps: tuple[Grasp, ...]) -> Array:
         """Return how far a thing goes (c, g), its moves in the one direction first, with each grasp."""

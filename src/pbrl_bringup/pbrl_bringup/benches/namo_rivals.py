@@ -30,6 +30,7 @@ from pbrl_namo.regions.openings import Opening, openings
 from pbrl_namo.regions.roadmap import Roadmap, build_roadmap
 from pbrl_namo.scene import NamoScene
 from pbrl_namo.scenes import draw_hidden, random_office
+from pbrl_namo.settings import NamoSettings
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.kinodynamic import Goal, KinodynamicSettings, PushProblem, WrenchLimits, plan_push
 
@@ -103,12 +104,30 @@ def _duel(
     beliefs = {name: certain(truth[name])}
     estimate(scene, free, roadmap, opening, beliefs, np.random.default_rng(seed))  # loads what was compiled
     began = time.perf_counter()
-    plan = estimate(scene, free, roadmap, opening, beliefs, rng).plan
+    plan = _ours(scene, free, roadmap, opening, beliefs, rng)
     our_seconds = time.perf_counter() - began
     ours, more_seconds, our_way = _carried_out(scene, target, plan, beliefs, truth[name], rng)
     way, their_seconds = _rrt(scene, roadmap, opening, truth[name], plan, opened, seed)
     theirs = way == way
     return Duel(name, ours, our_seconds + more_seconds, our_way, theirs, their_seconds, way)
+
+
+def _ours(
+    scene: NamoScene,
+    free: FreeSpace,
+    roadmap: Roadmap,
+    opening: Opening,
+    beliefs: Mapping[str, ObjectBelief],
+    rng: np.random.Generator,
+) -> ManipulationPlan | None:
+    """Plan one opening as `pbrl_namo.planner.plan` would: at first quickly, and harder where that finds none."""
+    plan = estimate(scene, free, roadmap, opening, beliefs, rng).plan
+    for settings in NamoSettings().harder():
+        if plan is not None:
+            break
+        dense = build_roadmap(scene, rng, settings.regions)
+        plan = estimate(scene, free, dense, opening, beliefs, rng, settings.manipulation).plan
+    return plan
 
 
 def _carried_out(
@@ -142,7 +161,7 @@ def _carried_out(
             for each in openings(scene, free, roadmap)
             if (each.object, each.start, each.end) == (name, here, there) and not each.then
         ]
-        plan = estimate(scene, free, roadmap, further[0], beliefs, rng).plan if further else None
+        plan = _ours(scene, free, roadmap, further[0], beliefs, rng) if further else None
         seconds += time.perf_counter() - began
     return open_, seconds, way if way > 0.0 else float("nan")
 

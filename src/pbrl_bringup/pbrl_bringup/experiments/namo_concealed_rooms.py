@@ -26,8 +26,9 @@ from pbrl_namo.beliefs.stops import Stop
 from pbrl_namo.executive.mission import job_seed
 from pbrl_namo.manipulation.plan import ManipulationPlan
 from pbrl_namo.manipulation.plane_kernel import moved
-from pbrl_namo.planner import NamoSettings, plan
+from pbrl_namo.planner import plan
 from pbrl_namo.scene import Movable, NamoScene
+from pbrl_namo.settings import NamoSettings
 from pbrl_namo.thinking import unlearned
 
 Points = NDArray[np.float64]
