@@ -24,6 +24,7 @@ from pbrl_namo.manipulation.cost import best_reward
 from pbrl_namo.manipulation.estimate import estimate_prepared
 from pbrl_namo.manipulation.making_room import RoomMaker
 from pbrl_namo.manipulation.plan import Estimate
+from pbrl_namo.manipulation.pushing_through import PushingThrough
 from pbrl_namo.manipulation.settings import ManipulationSettings
 from pbrl_namo.manipulation.study import Study
 from pbrl_namo.manipulation.yard import Yard
@@ -271,7 +272,11 @@ class _Maker:
     def _make_room(self, start: int, goal: int) -> Estimate | None:
         found = closers(self._scene, self._free, start, goal)
         rooms = RoomMaker(self.yard, self._free, self._roadmap, self.study, self._settings, self._been)
-        return rooms.find(found, self._scene.goal[:2])
+        made = rooms.find(found, self._scene.goal[:2])
+        if made is None and self._settings.pushing:
+            pushing = PushingThrough(self._scene, self._free, self.study, self._settings)
+            made = pushing.find(found, self._scene.goal[:2])
+        return made
 
     def _prepare(self) -> Yard:
         return Yard.of(self._scene, self._free.radius, self._settings.cell)

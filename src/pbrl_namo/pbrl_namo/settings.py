@@ -31,6 +31,7 @@ class LastResortSettings(Section):
         steps: manipulations of one thing, where more than one is allowed.
         step_places: poses of it from which a further one is looked for.
         step_grasps: that are tried at each.
+        pushing: with the last of the margins, also let a held thing push others before it, see `pushing_through`.
     """
 
     margins: tuple[Annotated[float, Field(gt=0.0, le=1.0)], ...] = (1.0, 0.5)
@@ -42,6 +43,7 @@ class LastResortSettings(Section):
     steps: Annotated[int, Field(ge=1, le=10)] = 8
     step_places: Annotated[int, Field(ge=1)] = 32
     step_grasps: Annotated[int, Field(ge=1, le=100)] = 32
+    pushing: bool = True
 
 
 class NamoSettings(Section):
@@ -86,10 +88,16 @@ class NamoSettings(Section):
             self.model_copy(
                 update={
                     "regions": regions,
-                    "manipulation": told.model_copy(update={**budgets, "motion": _nearer(told.motion, share)}),
+                    "manipulation": told.model_copy(
+                        update={
+                            **budgets,
+                            "motion": _nearer(told.motion, share),
+                            "pushing": told.pushing or (more.pushing and k + 1 == len(more.margins)),
+                        }
+                    ),
                 }
             )
-            for share in more.margins
+            for k, share in enumerate(more.margins)
         )
 
 

@@ -265,6 +265,7 @@ def _move(found: ManipulationPlan, start: int, end: int, targets: Array, then: t
         str(found.model_class),
         hands=found.sides,
         more=found.more,
+        pushes=found.pushes,
     )
 
 

@@ -141,3 +141,14 @@ def test_what_is_expected_without_a_model_counts(kinematics: RobotKinematics) ->
     assert list(limits.values())[2] == SETTINGS.abort.force
     with pytest.raises(ControlError, match="move of 'table_a': expected a trajectory"):
         plan_of(pull(segments=((np.full(3, np.nan), 1.0),)), candidate, SETTINGS)
+
+
+def test_what_is_to_be_pushed_as_well_is_expected_at_the_grips(kinematics: RobotKinematics) -> None:
+    """The model is of the object alone."""
+    candidate = find_grasp(GraspJob(scene_of(office(kinematics)), pull(), (), 5), SETTINGS.fetch.grasps).candidate
+    assert candidate is not None
+    alone, pushing = (
+        plan_of(pull(expected_force=80.0, pushes=pushes), candidate, SETTINGS).abort for pushes in ((), ("chair",))
+    )
+    assert alone.force_floor == SETTINGS.abort.force_floor
+    assert pushing.force_floor == pytest.approx(SETTINGS.abort.force_ratio * 80.0)

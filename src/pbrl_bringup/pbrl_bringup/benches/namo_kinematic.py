@@ -2,8 +2,9 @@
 
 What is true of a thing is an `ObjectModel`; held, it moves as `achievable_twist` lets it. The robot is where a plan
 says: it is not driven there, and does not grasp. A manipulation fails where the thing refuses the commanded motion or
-where thing or robot would be in something. Of what refused everything is told at once, as if its model were learned
-perfectly. So this tests plans and what follows from them; driving, grasping, forces and learning are not in it.
+where thing or robot would be in something; where it is planned to push others, these go as in contact worlds. Of what
+refused everything is told at once, as if its model were learned perfectly. So this tests plans and what follows from
+them; driving, grasping, forces and learning are not in it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from pbrl_control.planar import Array, compose, inverse
 from pbrl_control.types import PlanarTwist
 from pbrl_model.parameters import BodyParameters
 from pbrl_namo.beliefs.belief import ObjectBelief
+from pbrl_namo.manipulation.contact_worlds import ContactWorlds
 from pbrl_namo.manipulation.plan import ManipulationPlan
 from pbrl_namo.manipulation.plane_kernel import moved
 from pbrl_namo.manipulation.settings import ManipulationSettings
@@ -121,7 +123,7 @@ def find_way(
             return Run(end, made.reason, moves, failed, sum(seconds), max(seconds), tuple(unwilling))
         name = made.chosen.plan.object
         been.setdefault(name, []).append(np.array(scene.poses[name]))
-        scene, refused, hit = carry_out(scene, made.chosen.plan, truth[name])
+        scene, refused, hit = carry_out(scene, made.chosen.plan, truth[name], truth)
         moves, failed = moves + 1, failed + (refused or hit)
         unwilling += [name] if refused else []
         if refused or hit:
@@ -129,18 +131,23 @@ def find_way(
     return Run(LONG, "", moves, failed, sum(seconds), max(seconds, default=math.nan), tuple(unwilling))
 
 
-def carry_out(scene: NamoScene, what: ManipulationPlan, model: ObjectModel) -> tuple[NamoScene, bool, bool]:
+def carry_out(
+    scene: NamoScene, what: ManipulationPlan, model: ObjectModel, truth: Mapping[str, ObjectModel] | None = None
+) -> tuple[NamoScene, bool, bool]:
     """Move a thing as its true physics lets it.
 
     Args:
         scene: before.
         what: to do.
         model: of the thing.
+        truth: of all things; needed where others are to be pushed.
 
     Returns:
         The scene after it, the robot backed off; whether the thing refused the motion; whether something was in the
         way.
     """
+    if what.pushes:
+        return _push_through(scene, what, model, truth or {})
     pose = np.array(scene.poses[what.object], dtype=float)
     stand, leave = (compose(inverse(pose), place) for place in (what.stand, what.drive_to))
     room = scene.floor(leave_out=what.object).free.buffer(TOUCH)
@@ -165,6 +172,28 @@ def carry_out(scene: NamoScene, what: ManipulationPlan, model: ObjectModel) -> t
         if refused or hit:
             break
     return scene.moved({what.object: compose(pose, np.zeros(3))}, compose(pose, leave)), refused, hit
+
+
+def _push_through(
+    scene: NamoScene, what: ManipulationPlan, model: ObjectModel, truth: Mapping[str, ObjectModel]
+) -> tuple[NamoScene, bool, bool]:
+    """Do the same where others are pushed on the way; what is refused or jams is given up, and all is as it was."""
+    pose = np.array(scene.poses[what.object], dtype=float)
+    for motion in what.motions:
+        wanted = PlanarTwist(*map(float, motion.twist))
+        whole = math.sqrt(float(wanted.array() @ model.inertia_shape @ wanted.array()))
+        if achievable_twist(model, wanted, pose).refused_speed > REFUSED * whole:
+            return scene, True, False
+    settings = ManipulationSettings()
+    others = {name: (each,) for name, each in truth.items() if name != what.object}
+    worlds = ContactWorlds(scene, what.object, others, settings)
+    base = compose(inverse(pose), what.stand)
+    carried = worlds.carry(base, [(motion.twist, motion.duration) for motion in what.motions])
+    if carried.force[0] > settings.constraints.grip_force:
+        return scene, False, True
+    poses = {name: found[0] for name, found in carried.poses.items()}
+    leave = compose(inverse(pose), what.drive_to)
+    return scene.moved({**poses, what.object: carried.end}, compose(carried.end, leave)), False, False
 
 
 def true_models(scene: NamoScene, hidden: Mapping[str, Mapping[str, Any]]) -> dict[str, ObjectModel]:

@@ -36,6 +36,8 @@ class Move:
         model_class: in a word, for people.
         hands: that are to hold it; empty: any.
         more: moves that are to follow before the opening is there; with some, moved as planned is as good as it gets.
+        pushes: other things that it is to push before it; then `expected_force` is with what these take, and a model of
+            the object alone says too little.
     """
 
     object: str
@@ -50,6 +52,7 @@ class Move:
     model_class: str = ""
     hands: Hands = ()
     more: int = 0
+    pushes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

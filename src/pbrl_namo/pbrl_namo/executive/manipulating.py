@@ -85,6 +85,9 @@ def plan_of(move: Move, candidate: GraspCandidate, settings: ExecutiveSettings) 
     if move.model is None and math.isfinite(move.expected_force):
         most = max(abort.force_ratio * move.expected_force, abort.force_floor)
         abort = abort.model_copy(update={"force": most})
+    if move.pushes:
+        most = max(abort.force_ratio * move.expected_force, abort.force_floor)
+        abort = abort.model_copy(update={"force_floor": most})
     try:
         return TrajectoryPlan(
             name=f"clear {move.object}",

@@ -48,6 +48,7 @@ class ManipulationPlan:
         model: its physics in the one of them in which the largest force at a grip is the median.
         more: manipulations that are to follow before the opening is there; zero: this one makes it.
         aside: whether the object is only put out of the way of another, and no opening is to be looked for.
+        pushes: other things that it then pushes before it; forces are with what these take.
     """
 
     object: str
@@ -66,6 +67,7 @@ class ManipulationPlan:
     model: ObjectModel
     more: int = 0
     aside: bool = False
+    pushes: tuple[str, ...] = ()
 
     @property
     def twist(self) -> Array:

@@ -90,6 +90,7 @@ class ManipulationSettings(Section):
         step_places: poses of the thing from which a further step is looked for.
         step_grasps: that are tried at each of them.
         step_spacing: [m] between those along a face.
+        pushing: where nothing else helps, let a held thing push others before it.
         motion: how a held thing is moved.
         cost: of that.
         constraints: what counts as a constraint, and what the robot exerts at most.
@@ -113,6 +114,7 @@ class ManipulationSettings(Section):
     step_places: Annotated[int, Field(ge=1)] = 16
     step_grasps: Annotated[int, Field(ge=1, le=100)] = 8
     step_spacing: Positive = 0.15
+    pushing: bool = False
     motion: MotionSettings = MotionSettings()
     cost: CostSettings = CostSettings()
     constraints: ConstraintSettings = ConstraintSettings()
