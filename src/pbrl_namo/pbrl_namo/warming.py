@@ -9,17 +9,24 @@ from functools import cache
 import numpy as np
 
 from pbrl_bag.types import Recording
+from pbrl_control.constraints.object_model import ObjectModel
 from pbrl_model.parameters import BodyParameters
 from pbrl_namo.beliefs.belief import ObjectBelief
 from pbrl_namo.errors import NamoError
 from pbrl_namo.executive.jobs import GraspJob, PlanJob
 from pbrl_namo.executive.ways import find_grasp, find_way
+from pbrl_namo.manipulation.contact_worlds import ContactWorlds
+from pbrl_namo.manipulation.pushing_through import WORLDS
+from pbrl_namo.manipulation.settings import ManipulationSettings
 from pbrl_namo.scene import Movable, NamoScene
 from pbrl_namo.thinking import Thoughts
 
 Corners = list[tuple[float, float]]
 SQUARE: Corners = [(-0.4, -0.4), (0.4, -0.4), (0.4, 0.4), (-0.4, 0.4)]
 LONG: Corners = [(-0.375, -0.75), (0.375, -0.75), (0.375, 0.75), (-0.375, 0.75)]
+
+HELD_AT = np.array([-1.1, 0.0, 0.0])
+"""Of the base in the square table's frame, who holds it [m, rad]."""
 
 
 @cache
@@ -44,6 +51,10 @@ def compile_kernels() -> None:
         answer = thoughts.plan(PlanJob(scene, beliefs, {}, 1))
         if answer.move is not None:
             find_grasp(GraspJob(scene, answer.move, (), 1))
+    models = [ObjectModel.uniform(pinned, np.array(LONG))] * WORLDS
+    ContactWorlds(scene, "square", {"long": models}, ManipulationSettings()).carry(
+        HELD_AT, [(np.array([0.1, 0.0, 0.0]), 2.0)]
+    )
     try:
         find_way(NamoScene.of(room, {}, {}, {}, start, goal), 1)
     except NamoError:
