@@ -11,7 +11,6 @@ done by it.
 from __future__ import annotations
 
 import gc
-import sys
 import threading
 import time
 from dataclasses import replace
@@ -19,19 +18,16 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import rclpy
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, WrenchStamped
 from pbrl_msgs.msg import Grasps, Scene
 from rclpy.clock import Clock, ClockType
-from rclpy.executors import ExternalShutdownException
-from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
-from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
-from pbrl_bag.ros.stopping import WAIT, init_until_signal
+from pbrl_bag.ros.running import run_node
+from pbrl_bag.ros.stopping import spin_in_order
 from pbrl_control.controller import BodyController
 from pbrl_control.errors import ControlError
 from pbrl_control.installed import params_folder
@@ -235,40 +231,16 @@ def _tag_stream(name: str) -> str:
 
 
 def _spin(node: BodyControllerNode, stop: threading.Event) -> None:
-    """Handle what comes, in the order in which it comes, until `stop` is set.
-
-    rclpy's usual executor lays a new set of everything to wait for whenever it has handled what was there: that is half
-    of this node's work, and ticks come late by it.
-    """
+    """Handle what comes, in the order in which it comes, until `stop` is set; nothing is to hold up a tick."""
     gc.collect()
-    gc.freeze()  # what there is by now stays: looking through it again would hold up a tick
-    executor = EventsExecutor()
-    executor.add_node(node)
+    gc.freeze()  # what there is by now stays: looking through it again takes time
     take_priority(node.priority)
-    try:
-        while rclpy.ok() and not stop.is_set():
-            executor.spin_once(timeout_sec=WAIT)
-    finally:
-        executor.remove_node(node)
-        executor.shutdown()
+    spin_in_order(node, stop)
 
 
 def main() -> None:
-    """Run the node until it is told to stop."""
-    node = None
-    try:
-        stop = init_until_signal()
-        node = BodyControllerNode()
-        _spin(node, stop)
-    except (ControlError, BagError) as error:
-        print(f"body_controller_node: {error}", file=sys.stderr)
-        sys.exit(2)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
+    """Run the node until it is told to stop; errors at start are one line and exit code 2."""
+    run_node("body_controller_node", BodyControllerNode, (ControlError,), spin=_spin)
 
 
 if __name__ == "__main__":

@@ -7,22 +7,18 @@ them apart; what is heard of it goes into a new diagnosis.
 from __future__ import annotations
 
 import json
-import sys
 from typing import Any
 
-import rclpy
 from pbrl_msgs.msg import Mismatches, ObjectModels
 from pbrl_msgs.srv import PushObject
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
-from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
-from pbrl_bag.ros.stopping import init_until_signal, spin_until
+from pbrl_bag.ros.running import run_node
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.online.found import Found
 from pbrl_mismatch.online.monitor import MismatchMonitor
@@ -117,24 +113,15 @@ class MismatchNode(Node):
 
 
 def main() -> None:
-    """Run the node; errors at start are one line and exit code 2."""
-    node = None
-    fault = ""
-    try:
-        stop = init_until_signal()
-        node = MismatchNode()
-        spin_until(node, stop.is_set)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (BagError, ModelError, MismatchError) as error:
-        fault = " ".join(str(error).split())
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    if fault:
-        print(f"mismatch_node: {fault}", file=sys.stderr)
-        sys.exit(2)
+    """Run the node until it is told to stop; errors at start are one line and exit code 2."""
+    run_node(
+        "mismatch_node",
+        MismatchNode,
+        (
+            ModelError,
+            MismatchError,
+        ),
+    )
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -11,14 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rclpy
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from pbrl_msgs.msg import ObjectModels
 from pbrl_msgs.srv import LearnModel
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from visualization_msgs.msg import MarkerArray
@@ -26,7 +23,8 @@ from visualization_msgs.msg import MarkerArray
 from pbrl_bag import read_recording
 from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
-from pbrl_bag.ros.stopping import ended_by_signals, init_until_signal, spin_until
+from pbrl_bag.ros.running import run_node
+from pbrl_bag.ros.stopping import ended_by_signals
 from pbrl_bag.types import BodyGeometry, Recording
 from pbrl_model.errors import ModelError
 from pbrl_model.fitting.fit import Fit, FitOptions, ObjectFit, fit_recording
@@ -234,24 +232,8 @@ def _stamp(seconds: float) -> Time:
 
 
 def main() -> None:
-    """Run the node; errors at start are one line and exit code 2."""
-    node = None
-    fault = ""
-    try:
-        stop = init_until_signal()
-        node = ModelNode()
-        spin_until(node, stop.is_set)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (BagError, ModelError) as error:
-        fault = " ".join(str(error).split())
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    if fault:
-        print(f"model_node: {fault}", file=sys.stderr)
-        sys.exit(2)
+    """Run the node until it is told to stop; errors at start are one line and exit code 2."""
+    run_node("model_node", ModelNode, (ModelError,))
 
 
 if __name__ == "__main__":

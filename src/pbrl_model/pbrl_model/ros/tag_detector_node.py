@@ -8,25 +8,21 @@ the model is learned from, and because the same library reads pictures out of re
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
-import rclpy
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, PoseStamped, Quaternion
 from pbrl_msgs.msg import Scene
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
-from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
-from pbrl_bag.ros.stopping import init_until_signal, spin_until
+from pbrl_bag.ros.running import run_node
 from pbrl_model.errors import ModelError
 from pbrl_model.ros.pictures import calibration_from_msgs, grey_image, seconds
 from pbrl_model.tags.calibration import CameraCalibration
@@ -147,24 +143,8 @@ def _sheet_of_the_workspace() -> Path:
 
 
 def main() -> None:
-    """Run the node; errors at start are one line and exit code 2."""
-    node = None
-    fault = ""
-    try:
-        stop = init_until_signal()
-        node = TagDetectorNode()
-        spin_until(node, stop.is_set)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (BagError, ModelError) as error:
-        fault = " ".join(str(error).split())
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    if fault:
-        print(f"tag_detector_node: {fault}", file=sys.stderr)
-        sys.exit(2)
+    """Run the node until it is told to stop; errors at start are one line and exit code 2."""
+    run_node("tag_detector_node", TagDetectorNode, (ModelError,))
 
 
 if __name__ == "__main__":

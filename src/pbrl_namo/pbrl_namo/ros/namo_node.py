@@ -13,29 +13,23 @@ compiles ahead what planning calls.
 from __future__ import annotations
 
 import math
-import os
-import sys
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
-import rclpy
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from pbrl_msgs.msg import NamoStatus, ObjectModels, Scene
 from pbrl_msgs.srv import GraspObject, ReleaseObject
 from rclpy.client import Client
 from rclpy.clock import Clock, ClockType
-from rclpy.executors import ExternalShutdownException
-from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from pbrl_bag.errors import BagError
 from pbrl_bag.ros.parameters import declare, refuse_unknown
-from pbrl_bag.ros.stopping import WAIT, init_until_signal
+from pbrl_bag.ros.running import run_node
+from pbrl_bag.ros.stopping import spin_in_order
 from pbrl_control.errors import ControlError
 from pbrl_control.installed import params_folder
 from pbrl_control.kinematics import SIDES, RobotKinematics
@@ -311,39 +305,18 @@ class NamoNode(Node):
             self._executive.answer(answer)
 
 
-def _spin(node: NamoNode, stop: threading.Event) -> None:
-    """Handle what comes, in the order in which it comes, until `stop` is set."""
-    executor = EventsExecutor()
-    executor.add_node(node)
-    try:
-        while rclpy.ok() and not stop.is_set():
-            executor.spin_once(timeout_sec=WAIT)
-    finally:
-        executor.remove_node(node)
-        executor.shutdown()
-
-
 def main() -> None:
-    """Run the node until it is told to stop."""
-    node, code, thinking = None, 0, False
-    try:
-        stop = init_until_signal()
-        node = NamoNode()
-        _spin(node, stop)
-    except (ControlError, BagError, NamoError) as error:
-        print(f"namo_node: {error}", file=sys.stderr)
-        code = 2
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        if node is not None:
-            thinking = node.thinking
-            node.destroy_node()
-        rclpy.try_shutdown()
-    if thinking:  # Python would wait for the thread, and learning can take minutes
-        sys.stderr.flush()
-        os._exit(code)
-    sys.exit(code)
+    """Run the node until it is told to stop; errors at start are one line and exit code 2."""
+    run_node(
+        "namo_node",
+        NamoNode,
+        (
+            ControlError,
+            NamoError,
+        ),
+        spin=spin_in_order,
+        busy=lambda node: node.thinking,
+    )
 
 
 if __name__ == "__main__":
