@@ -14,15 +14,14 @@ from pbrl_control.cart import (
     CartBody,
     CartCommand,
     CartController,
-    CartLimits,
     CartPlan,
-    CartSettings,
     Cause,
     DriveStatus,
 )
 from pbrl_control.planar import Array, compose, wrap
 from pbrl_planner.cart.navigator import PATIENCE, Answer, Navigator
 from pbrl_planner.cart.outline import motions
+from pbrl_planner.cart.settings import CartParameters, load_cart
 from pbrl_planner.costmap import CostField
 from pbrl_planner.lattice import LatticePlan, LatticeSettings, Motions
 from pr2_cart_sim.scene import OfficeScene
@@ -34,13 +33,6 @@ TICK = 0.05
 SIDES = ("left", "right")
 LONGEST = 300.0
 """Simulated time after which a leg is given up [s]."""
-BLOCKED = 2.0
-"""Time before something that is in the way after which a way round it is looked for [s]."""
-RETRY, RETRY_MOST = 2.0, 6.0
-"""Time between two calls of the planner of which the first found nothing [s]; twice as long after each more, at most
-the second: that there is no path is true of a moment, and people walk on."""
-UNSEEN = 5.0
-"""Time after which something that nobody has seen since is taken to be gone, where it leaves no path [s]."""
 REFRESH = 15.0
 """Time on one plan after which it is made again: the floor is better known by then [s]."""
 AHEAD, ENOUGH = 0.3, 1.5
@@ -49,7 +41,6 @@ IN_THE_WAY = (Cause.OBSTACLE, Cause.FOOTPRINT)
 """Why a plan is given up that may be good again in a moment."""
 TRACED = 0.5
 """Between two points of the trace [s]."""
-SETTINGS = CartSettings(limits=CartLimits(articulation=(-0.45, 0.45)), delay=0.03, margin=0.015)
 
 
 @dataclass
@@ -79,7 +70,7 @@ class CartRun:
         goal: (3,) of `base` in `map` [m, rad].
         swept: motions of robot and cart.
         planning: epsilons and patience of the planner.
-        settings: of the local controller.
+        told: of the local controller, and when to plan again; None: as installed.
 
     Attributes:
         senses: all that is perceived.
@@ -93,7 +84,7 @@ class CartRun:
         goal: Array,
         swept: Motions,
         planning: LatticeSettings = PATIENCE,
-        settings: CartSettings = SETTINGS,
+        told: CartParameters | None = None,
     ) -> None:
         self.session, self.goal = session, np.asarray(goal, dtype=float)
         self.senses = CartSenses(swept.primitives.resolution)
@@ -103,11 +94,12 @@ class CartRun:
         self.reached = False
         self.ticks = _Ticks()
         self.last_plan: LatticePlan | None = None
-        self._settings = settings
+        told = told or load_cart()
+        self._settings, self._navigation = told.controller, told.navigation
         self._going: _Going | None = None
         self._sent = np.zeros(4)
         self._next_tick, self._next_plan, self._next_trace = 0.0, 0.0, 0.0
-        self._pause = RETRY
+        self._pause = self._navigation.retry
 
     def step(self) -> None:
         """Advance the simulator by one step; perceive, and control at each tick."""
@@ -157,7 +149,7 @@ class CartRun:
             self._give_up(now, going, command)
         elif command.status is DriveStatus.BLOCKED:
             going.blocked = now if going.blocked is None else going.blocked
-            if now - going.blocked >= BLOCKED and now >= self._next_plan:
+            if now - going.blocked >= self._navigation.blocked and now >= self._next_plan:
                 self._set_out(now)
         else:
             going.blocked = None
@@ -179,8 +171,9 @@ class CartRun:
         made = self._asked(now, floor, here)
         if made is None and self.navigator.calls[-1].answer is Answer.SHUT_IN:
             self.senses.recover(now)
-        elif made is None and any(len(each.places) for each in self.senses.forget_unseen(now, UNSEEN)):
-            self._pause, self._next_plan = RETRY, now + RETRY
+        elif made is None and any(len(each.places) for each in self.senses.forget_unseen(now, self._navigation.unseen)):
+            self._pause = self._navigation.retry
+            self._next_plan = now + self._pause
         if made is None:
             return
         self._going = _Going(made, self._controller(np.vstack([here, made.poses]), body), now)
@@ -189,9 +182,10 @@ class CartRun:
         """Return a plan from a pose (4,) on, and take note of when to ask again."""
         made = self.navigator.plan(now, floor, begin, self.goal)
         found = made is not None
-        late = now - self._next_plan > RETRY_MOST
-        self._next_plan = now + (RETRY if found or late else self._pause)
-        self._pause = RETRY if found else min(2.0 * (RETRY if late else self._pause), RETRY_MOST)
+        retry, most = self._navigation.retry, self._navigation.retry_most
+        late = now - self._next_plan > most
+        self._next_plan = now + (retry if found or late else self._pause)
+        self._pause = retry if found else min(2.0 * (retry if late else self._pause), most)
         self.last_plan = made if found else self.last_plan
         return made
 

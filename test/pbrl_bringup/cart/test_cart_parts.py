@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
-from pbrl_bringup.cart_run import AHEAD, RETRY, RETRY_MOST, CartRun, onward, rest
+from pbrl_bringup.cart_run import AHEAD, CartRun, onward, rest
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments.cart_office import route, rows_of
 from pbrl_bringup.experiments.kept import keep_run, read_run
@@ -18,6 +18,7 @@ from pbrl_control.cart.whereabouts import Whereabouts
 from pbrl_control.planar import compose, inverse, wrap
 from pbrl_planner.cart.navigator import PATIENCE, Answer, Navigator, PlannerCall, free_start, grid_of, with_room
 from pbrl_planner.cart.outline import ARTICULATION, GRIP, frame_at_grip, motions, pr2_with
+from pbrl_planner.cart.settings import load_cart
 from pbrl_planner.cart.shoulders import BEYOND, with_shoulders
 from pbrl_planner.costmap import LETHAL, CostField, Recovery, StaticMap
 from pbrl_planner.lattice import Lattice, LatticePlan, LatticeProblem, plan
@@ -28,6 +29,7 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(7)
 
 
+TOLD = load_cart().navigation
 CART = np.array([[-0.5, -0.275], [0.5, -0.275], [0.5, 0.275], [-0.5, 0.275]])
 
 
@@ -244,7 +246,8 @@ def test_where_there_is_no_path_it_waits_longer_and_longer_and_asks_again() -> N
         if now >= run._next_plan and len(asked) < 6:
             run._set_out(now)
             asked.append(now)
-    assert np.diff(asked) == pytest.approx([RETRY, 2 * RETRY, RETRY_MOST, RETRY_MOST, RETRY], abs=0.051)
+    waits = [TOLD.retry, 2 * TOLD.retry, TOLD.retry_most, TOLD.retry_most, TOLD.retry]
+    assert np.diff(asked) == pytest.approx(waits, abs=0.051)
     assert run._going is not None and run._going.plan is made, "a failure does not end what is driven"
 
 
@@ -254,7 +257,7 @@ def test_where_something_could_be_forgotten_it_asks_again_soon() -> None:
     run._set_out(2.0)
     run.senses.stale = 3
     run._set_out(6.0)
-    assert run._next_plan == 6.0 + RETRY and run.senses.recovered == 0 and run.senses.stale == 0
+    assert run._next_plan == 6.0 + TOLD.retry and run.senses.recovered == 0 and run.senses.stale == 0
     run._set_out(8.0)
     assert run._going is not None
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from pbrl_control.cart import CartSettings
-from pbrl_control.settings import Positive, Section
+from pbrl_control.installed import params_folder
+from pbrl_control.settings import Positive, Section, load_section
 from pbrl_planner.costmap import CostmapSettings
 from pbrl_planner.lattice import LatticeSettings
 
@@ -42,3 +45,15 @@ class CartParameters(Section):
     local_costmap: CostmapSettings = CostmapSettings()
     global_costmap: CostmapSettings = CostmapSettings()
     navigation: NavigationSettings = NavigationSettings()
+
+
+def load_cart(path: str | Path = "") -> CartParameters:
+    """Read what a cart is pushed with.
+
+    Args:
+        path: of the YAML file; empty: `cart.yaml` as installed.
+
+    Raises:
+        ControlError: there is no such file, or it is not as it should be.
+    """
+    return load_section(Path(path) if path else params_folder("settings") / "cart.yaml", CartParameters, "settings")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import TypeVar
 
 from rclpy.node import Node
@@ -12,9 +11,7 @@ from pbrl_bag.ros import running
 from pbrl_bag.ros.parameters import declare
 from pbrl_bag.ros.stopping import spin_in_order
 from pbrl_control.errors import ControlError
-from pbrl_control.installed import params_folder
-from pbrl_control.settings import load_section
-from pbrl_planner.cart.settings import CartParameters
+from pbrl_planner.cart.settings import CartParameters, load_cart
 from pbrl_planner.errors import PlannerError
 
 AnyNode = TypeVar("AnyNode", bound=Node)
@@ -27,8 +24,7 @@ def declare_settings(node: Node) -> CartParameters:
         ControlError: there is no such file, or it is not as it should be.
     """
     path = declare(node, "settings", "", "YAML of planner, costmaps and controller; empty: cart.yaml as installed")
-    file = Path(path) if path else params_folder("settings") / "cart.yaml"
-    return load_section(file, CartParameters, "settings")
+    return load_cart(path)
 
 
 def run_node(name: str, make: Callable[[], AnyNode], busy: Callable[[AnyNode], bool] = lambda _: False) -> None:
