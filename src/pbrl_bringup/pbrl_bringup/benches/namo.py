@@ -30,6 +30,7 @@ from pbrl_namo.scene import NamoScene
 from pbrl_namo.scenes import load_svg, random_office
 from pbrl_namo.scenes.hidden import nominal_mass
 from pbrl_namo.settings import NamoSettings
+from pbrl_namo.warming import compile_kernels
 
 ROOMS = 20
 PLANNING = 2.0
@@ -54,7 +55,7 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
         quick: a tenth of the rooms.
         out: folder; nothing is written into it.
     """
-    office_run(seed, 0, THINGS)  # compiles, or loads what was compiled
+    compile_kernels()
     parts = [
         thesis_rooms(seed, _count(ROOMS, quick)),
         unreachable(seed, _count(WALLED, quick)),

@@ -34,6 +34,7 @@ from pbrl_namo.scene import NamoScene
 from pbrl_namo.scenes import draw_hidden, random_office
 from pbrl_namo.scenes.hidden import CASTERS
 from pbrl_namo.settings import NamoSettings
+from pbrl_namo.warming import compile_kernels
 
 ROLLING, TREAD, INSET = 0.02, 0.7, 0.06
 """Friction coefficient of a thing whose casters roll, and of a locked one's tread; how far casters are inwards [m]."""
@@ -86,6 +87,7 @@ def office_run(seed: int, number: int, count: int) -> Run:
         number: of the office.
         count: of movable things.
     """
+    compile_kernels()  # in each process: planning is timed, loading is not planning
     rng = np.random.default_rng([seed, count, number])
     scene = random_office(count, rng, move_needed=True)
     return find_way(scene, true_models(scene, draw_hidden(scene, rng)), seed)
