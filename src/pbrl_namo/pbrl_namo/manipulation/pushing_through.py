@@ -84,6 +84,8 @@ class PushingThrough:
     def find(self, closers: Sequence[Opening], target: Array) -> Estimate | None:
         """Return what to expect of pushing something through; None where nothing helps.
 
+        Now and then the best way touches nothing, because contact worlds have no margins: then it pushes nothing.
+
         Args:
             closers: openings from the robot's region that could not be made.
             target: (2,) in `world` to which a way is to be open [m].
@@ -110,7 +112,7 @@ class PushingThrough:
                 best = through
             if best is not None and best.works.mean() >= SURE:
                 break
-        if best is None or not best.pushed:
+        if best is None:
             return None
         made = estimate_of(opening, (best.step,), study, target, settings)
         if made is None or made.plan is None:
