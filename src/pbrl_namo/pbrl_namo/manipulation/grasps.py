@@ -117,17 +117,17 @@ def chosen(grasps: Sequence[Grasp], wanted: Flags, settings: ManipulationSetting
         settings: how many, how far apart.
     """
     middles = np.array([np.mean(list(grasp.contacts.values()), axis=0) for grasp in grasps]).reshape(-1, 2)
-    kept: list[int] = []
-    for both in (True, False):
-        left = [k for k in np.flatnonzero(wanted).tolist() if (len(grasps[k].sides) == 2) == both]
-        while left and len(kept) < settings.grasps:
-            gaps = [
-                min((float(np.hypot(*(middles[k] - middles[other]))) for other in kept), default=math.inf) for k in left
-            ]
-            best = int(np.argmax(gaps))
+    hands = np.array([len(grasp.sides) for grasp in grasps], dtype=np.int64)
+    gaps, kept = np.full(len(grasps), math.inf), list[int]()
+    for count in (2, 1):
+        left: Flags = np.asarray(wanted) & (hands == count)
+        while left.any() and len(kept) < settings.grasps:
+            best = int(np.argmax(np.where(left, gaps, -1.0)))
             if gaps[best] < settings.apart:
                 break
-            kept.append(left.pop(best))
+            kept.append(best)
+            left[best] = False
+            gaps = np.minimum(gaps, np.hypot(*(middles - middles[best]).T))
     return kept
 
 

@@ -35,8 +35,8 @@ from pbrl_namo.regions.free_space import FreeSpace, free_space
 from pbrl_namo.regions.openings import Opening
 from pbrl_namo.scene import NamoScene
 
-WORLDS = 8
-"""Contact worlds in which each way is followed."""
+WORLDS, FEW = 8, 2
+"""Contact worlds in which a way is followed that works in one of these few."""
 GRASPS = 6
 """That are tried."""
 LENGTHS = (0.0, 0.5, 1.0)
@@ -103,11 +103,18 @@ class PushingThrough:
         grasps = self._grasps(opening, study)
         if not grasps:
             return None
-        models = {other: _spread(self._study(other).worlds.models) for other in mobile}
-        worlds = ContactWorlds(scene, name, models, settings)
+        few, worlds = (
+            ContactWorlds(
+                scene, name, {other: _spread(self._study(other).worlds.models, count) for other in mobile}, settings
+            )
+            for count in (FEW, WORLDS)
+        )
         best, limit = None, settings.constraints.grip_force
         for step in self._ways(opening, study, grasps, mobile, target):
-            through = self._followed(worlds, name, mobile, step, target, limit - self._own(study, step))
+            spare = limit - self._own(study, step)
+            if self._followed(few, name, mobile, step, target, spare) is None:
+                continue
+            through = self._followed(worlds, name, mobile, step, target, spare)
             if through is not None and (best is None or through.works.mean() > best.works.mean()):
                 best = through
             if best is not None and best.works.mean() >= SURE:
@@ -210,7 +217,7 @@ class PushingThrough:
         return here is not None and here == free.index(target)
 
 
-def _spread(models: Sequence[ObjectModel]) -> tuple[ObjectModel, ...]:
-    """Return a few of a thing's worlds, at equal distances."""
-    picked = np.linspace(0, len(models) - 1, WORLDS).round().astype(int)
+def _spread(models: Sequence[ObjectModel], count: int) -> tuple[ObjectModel, ...]:
+    """Return some of a thing's worlds, in the middles of equal parts."""
+    picked = ((np.arange(count) + 0.5) / count * len(models)).astype(int)
     return tuple(models[k] for k in picked)
