@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import compress, pairwise
 from pathlib import Path
 from types import MappingProxyType
 
@@ -30,6 +31,10 @@ SHOWN = {
 }
 """States that have a picture, and what is written over it."""
 MOST, COLUMNS = 12, 3
+INSTANT = 0.05
+"""[s] within which two pictures show the same: the first is kept, which says why."""
+SAID = ("AskMismatch",)
+"""States with a picture for what is written below it."""
 CONCEALED = "#c2185b"
 MOVED = 0.02
 """[m] and [rad] together from which on a thing is drawn where it was before."""
@@ -51,7 +56,9 @@ def draw(
         name: of the file, without its ending.
         braked: (x, y) of the casters of each thing that are locked, in its own frame [m].
     """
-    moments = [each for each in run.moments if each.state in SHOWN]
+    shown = [each for each in run.moments if each.state in SHOWN]
+    later = [now.state in SAID or now.time > before.time + INSTANT for before, now in pairwise(shown)]
+    moments = list(compress(shown, [True, *later]))
     if len(moments) > MOST:  # the beginning and the end say most
         moments = [*moments[: MOST // 2], *moments[-(MOST - MOST // 2) :]]
     rows = -(-len(moments) // COLUMNS)
