@@ -170,8 +170,9 @@ def test_a_signal_ends_it_without_a_word(number: signal.Signals, tmp_path: Path)
 
 
 STARTED = """
+from pbrl_bag.ros import running
 from pbrl_mismatch.ros import mismatch_node
-spin = mismatch_node.spin_until
-mismatch_node.spin_until = lambda node, done: (print("spinning", flush=True), spin(node, done))
+spin = running.spin_until
+running.spin_until = lambda node, done: (print("spinning", flush=True), spin(node, done))
 mismatch_node.main()
 """
