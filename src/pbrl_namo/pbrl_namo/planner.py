@@ -274,7 +274,7 @@ class _Maker:
         rooms = RoomMaker(self.yard, self._free, self._roadmap, self.study, self._settings, self._been)
         made = rooms.find(found, self._scene.goal[:2])
         if made is None and self._settings.pushing:
-            pushing = PushingThrough(self._scene, self._free, self.study, self._settings)
+            pushing = PushingThrough(self.yard, self._free, self.study, self._settings)
             made = pushing.find(found, self._scene.goal[:2])
         return made
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -107,6 +107,11 @@ class NamoScene:
         """Return the map for navigation and grasping, with everything in it as it stands, less one thing."""
         things = {name: outline for name, outline in self.outlines.items() if name != leave_out}
         return FloorMap(self.room, {**self.fixed, **things})
+
+    def without(self, names: Collection[str]) -> NamoScene:
+        """Return the scene with some movable things gone; what is none of them changes nothing."""
+        left = {name: thing for name, thing in self.movable.items() if name not in names}
+        return replace(self, movable=left, poses={name: self.poses[name] for name in left})
 
     def moved(self, poses: Mapping[str, Array], start: Array | None = None) -> NamoScene:
         """Return the scene with some things, or the robot, elsewhere.

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -205,8 +204,7 @@ class Proof:
         return self._stances[name]
 
     def _without(self, gone: Collection[str]) -> tuple[NamoScene, FreeSpace]:
-        left = {name: thing for name, thing in self._scene.movable.items() if name not in gone}
-        bare = replace(self._scene, movable=left, poses={name: self._scene.poses[name] for name in left})
+        bare = self._scene.without(gone)
         return bare, free_space(bare)
 
     def _joined(self, gone: Collection[str]) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -153,5 +152,4 @@ def _without(scene: NamoScene, names: tuple[str, ...]) -> NamoScene:
     for name in names:
         if name not in scene.movable:
             raise NamoError(f"plan: expected things that are in the scene, got {name!r}")
-    left = {name: thing for name, thing in scene.movable.items() if name not in names}
-    return replace(scene, movable=left, poses={name: scene.poses[name] for name in left})
+    return scene.without(names)

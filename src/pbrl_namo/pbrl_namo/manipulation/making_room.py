@@ -114,7 +114,7 @@ class RoomMaker:
 
     def _steps(self, opening: Opening, target: Array, gone: Collection[str]) -> tuple[Step, ...]:
         """Return the steps of an opening's thing with others gone."""
-        scene = _without(self._scene, gone)
+        scene = self._scene.without(gone)
         free = free_space(scene, self._free.radius)
         start = free.index(self._inside(opening.start))
         if start is None or free.index(target) == start:
@@ -184,11 +184,6 @@ def _taken(scene: NamoScene, name: str, steps: Sequence[Step]) -> shapely.Geomet
                 corners = np.array([compose(pose, np.array([*corner, 0.0]))[:2] for corner in outline])
                 covers.append(shapely.Polygon(corners))
     return shapely.union_all(covers).buffer(CLEAR)
-
-
-def _without(scene: NamoScene, gone: Collection[str]) -> NamoScene:
-    left = {name: thing for name, thing in scene.movable.items() if name not in gone}
-    return replace(scene, movable=left, poses={name: scene.poses[name] for name in left})
 
 
 def _near(a: Array, b: Array) -> bool:

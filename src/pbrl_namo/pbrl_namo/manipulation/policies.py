@@ -15,11 +15,13 @@ refuse more than a small share, the robot would meet with an unexpected force an
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_control.constraints.classes import Freedom, ModelClass
 from pbrl_control.planar import Array
 from pbrl_namo.manipulation.settings import ManipulationSettings
 from pbrl_namo.manipulation.worlds import Worlds
@@ -96,6 +98,21 @@ def drives_of(base: Array, radii: tuple[float, ...]) -> Array:
         turn = np.array([y, -x, 1.0])  # 1 rad/s about the point
         found += [turn, -turn] if k > 0 else []  # about the base itself only once
     return np.array(found)
+
+
+def motions_of(freedom: Freedom, bases: Sequence[Array], radii: tuple[float, ...]) -> tuple[Array, Flags]:
+    """Return unit twists (c, 3) that a thing allows and a base can do with it, and with which base (c, g).
+
+    Args:
+        freedom: of the thing.
+        bases: g poses (3,) of the base in its frame [m, rad].
+        radii: of arcs that the base drives with what is free [m].
+    """
+    if freedom.model_class != ModelClass.UNCONSTRAINED:
+        twists = np.vstack((freedom.moves, -freedom.moves))
+        return twists, np.ones((len(twists), len(bases)), dtype=bool)
+    drives = [drives_of(base, radii) for base in bases]
+    return np.vstack(drives), np.repeat(np.eye(len(bases), dtype=bool), len(drives[0]), axis=0)
 
 
 def alike(a: Array, b: Array, settings: ManipulationSettings) -> bool:

@@ -15,7 +15,6 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from pbrl_control.constraints.classes import ModelClass
 from pbrl_control.constraints.object_model import ObjectModel
 from pbrl_control.planar import Array, compose
 from pbrl_namo.errors import NamoError
@@ -24,7 +23,7 @@ from pbrl_namo.manipulation.effort_kernel import SUM
 from pbrl_namo.manipulation.grasps import Grasp, chosen
 from pbrl_namo.manipulation.in_steps import estimate_of
 from pbrl_namo.manipulation.plan import Estimate
-from pbrl_namo.manipulation.policies import Commands, drives_of
+from pbrl_namo.manipulation.policies import Commands, motions_of
 from pbrl_namo.manipulation.rollout import Roller
 from pbrl_namo.manipulation.settings import ManipulationSettings
 from pbrl_namo.manipulation.steps import SHORT, Step
@@ -33,7 +32,6 @@ from pbrl_namo.manipulation.ways_to_move import WaysToMove
 from pbrl_namo.manipulation.yard import Yard
 from pbrl_namo.regions.free_space import FreeSpace, free_space
 from pbrl_namo.regions.openings import Opening
-from pbrl_namo.scene import NamoScene
 
 WORLDS, FEW = 8, 2
 """Contact worlds in which a way is followed that works in one of these few."""
@@ -70,16 +68,17 @@ class PushingThrough:
     """Looks for a thing that opens the way if it is moved against others.
 
     Args:
-        scene: things where they stand.
+        yard: the scene, prepared.
         free: its free space.
         study: makes a thing ready.
         settings: of Monte-Carlo manipulation.
     """
 
     def __init__(
-        self, scene: NamoScene, free: FreeSpace, study: Callable[[str], Study], settings: ManipulationSettings
+        self, yard: Yard, free: FreeSpace, study: Callable[[str], Study], settings: ManipulationSettings
     ) -> None:
-        self._scene, self._free, self._study, self._settings = scene, free, study, settings
+        self._yard, self._scene = yard, yard.scene
+        self._free, self._study, self._settings = free, study, settings
 
     def find(self, closers: Sequence[Opening], target: Array) -> Estimate | None:
         """Return what to expect of pushing something through; None where nothing helps.
@@ -136,7 +135,7 @@ class PushingThrough:
 
     def _grasps(self, opening: Opening, study: Study) -> tuple[Grasp, ...]:
         """Return a few grasps that the robot can take from where it is."""
-        yard = Yard.of(self._scene, self._free.radius, self._settings.cell)
+        yard = self._yard
         others = yard.pieces.taken(np.flatnonzero(~yard.owned((opening.object,))))
         pose = np.array(self._scene.poses[opening.object], dtype=float)
         usable = study.stances.free(pose, self._free.regions[opening.start], others)
@@ -148,17 +147,10 @@ class PushingThrough:
     ) -> Iterator[Step]:
         """Yield motions that would open the way with other things gone, the shortest first, and how far each may go."""
         name, settings = opening.object, self._settings
-        left = {each: thing for each, thing in self._scene.movable.items() if each not in gone}
-        bare = replace(self._scene, movable=left, poses={each: self._scene.poses[each] for each in left})
-        yard = Yard.of(bare, self._free.radius, settings.cell)
+        yard = Yard.of(self._scene.without(gone), self._free.radius, settings.cell)
         asked = Opening(opening.start, opening.end, name)
         freedom = study.worlds.only(study.worlds.typical()).freedoms[0]
-        if freedom.model_class == ModelClass.UNCONSTRAINED:
-            drives = [drives_of(grasp.base, settings.radii) for grasp in grasps]
-            twists, usable = np.vstack(drives), np.repeat(np.eye(len(grasps), dtype=bool), len(drives[0]), axis=0)
-        else:
-            twists = np.vstack((freedom.moves, -freedom.moves))
-            usable = np.ones((len(twists), len(grasps)), dtype=bool)
+        twists, usable = motions_of(freedom, [grasp.base for grasp in grasps], settings.radii)
         first = Roller(yard, asked, study.body, grasps, target, settings).roll(twists, usable)
         whole = Roller(yard, asked, study.body, grasps, None, settings).roll(twists, usable).went
         pose = np.array(self._scene.poses[name], dtype=float)
@@ -206,11 +198,8 @@ class PushingThrough:
         """Say whether the robot can back off, and drive to a point (2,) then, in one world."""
         poses = {each: found[world] for each, found in carried.poses.items()}
         scene = self._scene.moved({**poses, name: carried.end})
-        covers = [
-            shapely.Polygon([compose(carried.end, np.array([*corner, 0.0]))[:2] for corner in outline])
-            for outline in step.grasp.covers[:1]
-        ]
-        if any(cover.intersects(scene.outlines[each]) for cover in covers for each in poses):
+        robot = [compose(carried.end, np.array([*corner, 0.0]))[:2] for corner in step.grasp.covers[0]]
+        if any(shapely.Polygon(robot).intersects(scene.outlines[each]) for each in poses):
             return False
         free = free_space(scene, self._free.radius)
         here = free.index(compose(carried.end, step.grasp.leave)[:2])

@@ -23,7 +23,7 @@ from pbrl_control.planar import Array
 from pbrl_namo.manipulation.effort_kernel import SUM
 from pbrl_namo.manipulation.grasps import Grasp, chosen
 from pbrl_namo.manipulation.plane_kernel import moved
-from pbrl_namo.manipulation.policies import TURNS, Commands, drives_of
+from pbrl_namo.manipulation.policies import TURNS, Commands, motions_of
 from pbrl_namo.manipulation.reference import WayField
 from pbrl_namo.manipulation.rollout import Roller, timing
 from pbrl_namo.manipulation.settings import ManipulationSettings
@@ -251,21 +251,13 @@ class StepSearch:
             return None, None
         roller = self._roller.regrasped(place.pose, grasps, self._field)
         self._line = self._line or roller.reference()
-        twists, mask = self._twists(grasps)
+        twists, mask = motions_of(self._freedom, [grasp.base for grasp in grasps], settings.radii)
         found = roller.roll(twists, mask & self._bearable(twists, mask, grasps))
         speeds, _ = timing(twists, grasps, settings.motion)
         c, g = np.nonzero((found.went > SHORT) | found.opened)
         ways = found.went[c, g]
         tries = Tries(place.pose, grasps, g, twists[c], ways, ways / speeds[c, g], found.opened[c, g])
         return self._aim.reached(tries) if len(tries) else None, tries
-
-    def _twists(self, grasps: tuple[Grasp, ...]) -> tuple[Array, Flags]:
-        """Return unit twists (c, 3) worth trying, and with which grasps (c, g)."""
-        if self._freedom.model_class != ModelClass.UNCONSTRAINED:
-            twists = np.vstack((self._freedom.moves, -self._freedom.moves))
-            return twists, np.ones((len(twists), len(grasps)), dtype=bool)
-        drives = [drives_of(grasp.base, self._settings.radii) for grasp in grasps]
-        return np.vstack(drives), np.repeat(np.eye(len(grasps), dtype=bool), len(drives[0]), axis=0)
 
     def _bearable(self, twists: Array, mask: Flags, grasps: tuple[Grasp, ...]) -> Flags:
         """Say which twists (c, g) the grips have the force for."""
