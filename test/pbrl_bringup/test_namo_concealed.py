@@ -7,25 +7,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments import namo_concealed, namo_concealed_rooms
 from pbrl_bringup.experiments.namo_concealed import REPAIRED, SURPRISES, Pair, rows_of
-from pbrl_bringup.experiments.namo_concealed_rooms import (
-    CARPET,
-    KINDS,
-    SQUARE,
-    TETHER,
-    UNSEEN,
-    draw_concealing,
-    seen_room,
-    track,
-)
+from pbrl_bringup.experiments.namo_concealed_rooms import FREE, HEAVY, PASSAGE, Concealing, draw_concealing, seen_room
+from pbrl_bringup.experiments.namo_concealing import CARPET, CASTERS, KINDS, TETHER, UNSEEN, at, conceal, track
 from pbrl_bringup.experiments.namo_figure import draw
+from pbrl_bringup.experiments.namo_rooms import SQUARE
 from pbrl_bringup.namo_run import Moment, NamoOutcome
+from pbrl_control.planar import compose, inverse
 from pbrl_namo.executive import State
 from pbrl_namo.executive.mission import job_seed
+from pbrl_namo.manipulation.plan import ManipulationPlan
 from pbrl_namo.planner import plan
+from pbrl_namo.scene import NamoScene
 from pbrl_namo.settings import NamoSettings
 from pbrl_namo.thinking import unlearned
 
@@ -41,28 +38,60 @@ def outcome(reached: bool, repaired: float = 0.0, surprises: float = 1.0) -> Nam
     return NamoOutcome(str(state), "said", 100.0, rows, (moment,), 0.02, room, {SQUARE: outline}, (5.0, 0.0))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_first_thing_that_is_planned_meets_what_is_concealed(kind: str) -> None:
-    room = draw_concealing(np.random.default_rng([3, KINDS.index(kind)]), kind)
-    told = room.scene.concealed.model_dump(exclude_defaults=True)
-    assert set(told) == {EFFECTS[kind]}
-    assert set(room.scene.bodies) == {SQUARE, namo_concealed_rooms.CUPBOARD}
+def first_of(room: Concealing) -> tuple[NamoScene, ManipulationPlan]:
+    """Return what is seen of a room, and what is done first by who knows nothing."""
     pose, start = np.array(room.scene.bodies[SQUARE].pose), np.array(room.scene.robot.pose)
     seen = seen_room(pose, start, room.goal)
     believed = unlearned(seen.movable[SQUARE], NamoSettings())
     chosen = plan(seen, {SQUARE: believed}, job_seed(room.seed, 1)).chosen
     assert chosen is not None
     assert chosen.plan is not None
-    stops = []
-    for share in (0.35, 0.45, 0.55):
-        meeting = namo_concealed_rooms._meeting(kind, seen, chosen.plan, share)
-        stops += [] if meeting is None else [meeting.stop]
-    poses = track(seen, chosen.plan)
-    for stop in stops:
-        assert stop.beyond(poses[0]) < 0.0
-        assert float(stop.beyond(poses).max()) > 0.0
-    assert stops
+    return seen, chosen.plan
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_first_thing_that_is_planned_meets_what_is_concealed(kind: str) -> None:
+    room = draw_concealing(np.random.default_rng([3, KINDS.index(kind)]), kind)
+    told = room.scene.concealed.model_dump(exclude_defaults=True)
+    assert set(told) == {EFFECTS[kind]}
+    assert set(room.scene.bodies) == {SQUARE, namo_concealed_rooms.CUPBOARD}
+    seen, what = first_of(room)
+    poses = track(seen, what)
+    met = [conceal(kind, seen, what, share, PASSAGE) for share in (0.35, 0.45, 0.55)]
+    meetings = [meeting for meeting in met if meeting is not None]
+    assert meetings
+    for meeting in meetings:
+        assert meeting.stopping(seen, what)
+        assert all(stop.beyond(poses[0]) < 0.0 for stop in meeting.stops)
+        assert meeting.solid is None or not meeting.solid.intersects(seen.outlines[SQUARE])
     assert all(np.isfinite(shape).all() for shape in room.outlines())
+
+
+def test_no_caster_stands_on_the_carpet_until_the_first_one_comes_to_its_edge() -> None:
+    seen, what = first_of(draw_concealing(np.random.default_rng(4), CARPET))
+    meeting = conceal(CARPET, seen, what, 0.45, PASSAGE)
+    assert meeting is not None
+    tile = shapely.Polygon(meeting.concealed["floor_patch"][0]["polygon"])
+    poses = track(seen, what)
+    met = int(np.argmin(np.abs(poses - meeting.pose).sum(axis=1)))
+    on = [[bool(shapely.intersects_xy(tile, *caster)) for caster in at(CASTERS, pose)] for pose in poses]
+    assert not np.any(on[:met])
+    assert np.any(on[met + 1 :])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("friction", [FREE, HEAVY])
+def test_who_does_not_know_what_was_met_runs_into_it_again(kind: str, friction: float) -> None:
+    seen, what = first_of(draw_concealing(np.random.default_rng([6, KINDS.index(kind)]), kind))
+    found = (conceal(kind, seen, what, share, PASSAGE) for share in np.linspace(0.35, 0.55, 9))
+    kept = [each for each in found if each is not None and namo_concealed_rooms._kept(seen, what, each, 1)]
+    for meeting in kept:
+        leave = compose(inverse(seen.poses[SQUARE]), what.drive_to)
+        there = seen.moved({SQUARE: meeting.pose}, compose(meeting.pose, leave))
+        again = namo_concealed_rooms._chosen(there, friction, 1, ())
+        assert again is not None
+        assert meeting.stopping(there, again)
+    assert kept
 
 
 def test_the_same_draws_give_the_same_room() -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pbrl_bag.types import Recording
+from pbrl_mismatch.diagnose import track_of
 from pbrl_mismatch.encounter import find_encounter
 from pbrl_mismatch.online.slices import between
 
@@ -56,3 +58,21 @@ def test_the_same_recording_gives_the_same_answer(clean: Recording, blocked: Rec
     assert one is not None
     assert other is not None
     assert one.place.tobytes() == other.place.tobytes()
+
+
+def test_a_sensor_at_the_end_of_its_range_still_says_that_something_was_met(
+    clean: Recording, blocked: Recording
+) -> None:
+    time, ahead = met_at(clean, blocked)
+    push = between(blocked, 0.0, time + 0.5)
+    most = max(float(np.abs(stream.torque).max()) for stream in push.wrenches.values())
+    short = {
+        name: replace(stream, torque=np.clip(stream.torque, -0.5 * most, 0.5 * most))
+        for name, stream in push.wrenches.items()
+    }
+    cut = replace(push, wrenches=short)
+    assert any(each.saturated for each in track_of(cut, "table").missing)
+    found = find_encounter(cut, "table")
+    assert found is not None
+    assert abs(found.time - time) < 0.4
+    assert found.direction @ ahead < -0.5

@@ -7,7 +7,7 @@ direction can be told from the left-out wrench, and to know that much is enough 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -74,6 +74,9 @@ class Encounter:
 def find_encounter(recording: Recording, name: str) -> Encounter | None:
     """Return what a body met in the last hold of it, or None: nothing set in, or it never moved freely.
 
+    Where a sensor was at the end of its range, what was met pushed this hard at least, and that is what is looked for;
+    all else that is missing stays unknown.
+
     Args:
         recording: with the hold.
         name: of the body.
@@ -83,6 +86,7 @@ def find_encounter(recording: Recording, name: str) -> Encounter | None:
         ModelError: a stream is broken, or the body never moved.
     """
     track = track_of(recording, name)
+    track = replace(track, missing=tuple(each for each in track.missing if not each.saturated))
     row = neutral_row()
     row[COLUMN["mass"]] = track.nominal_mass if np.isfinite(track.nominal_mass) else UNKNOWN_MASS
     row[COLUMN["mu_ground"]] = ROLLING

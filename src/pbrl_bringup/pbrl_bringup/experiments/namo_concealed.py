@@ -16,14 +16,15 @@ import numpy as np
 
 from pbrl_bringup.benches.rows import Measured, Row, at_least
 from pbrl_bringup.experiments.kept import kept_run
-from pbrl_bringup.experiments.namo_concealed_rooms import KINDS, Concealing, draw_concealing
+from pbrl_bringup.experiments.namo_concealed_rooms import Concealing, draw_concealing
+from pbrl_bringup.experiments.namo_concealing import KINDS
 from pbrl_bringup.experiments.namo_figure import draw
 from pbrl_bringup.experiments.namo_trials import RUNS_KEPT
 from pbrl_bringup.namo_run import NamoOutcome, run_namo
 from pbrl_bringup.parallel import in_parallel
 from pbrl_namo.executive.settings import ExecutiveSettings
 
-ROOMS, MARGIN = 24, 0.2
+ROOMS, MARGIN = 18, 0.2
 """Rooms, and by how much the share of those in which the goal is reached is to be above the plain learner's."""
 LONGEST = 600.0
 """Simulated time after which a run has failed [s]."""

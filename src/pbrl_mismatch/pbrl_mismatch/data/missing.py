@@ -24,11 +24,15 @@ LEAST_PIECE = 0.3
 
 @dataclass(frozen=True)
 class Missing:
-    """From `start` to `end` [s] something is not known; `why` says of which stream, and what was wrong with it."""
+    """From `start` to `end` [s] something is not known; `why` says of which stream, and what was wrong with it.
+
+    `saturated`: a sensor was at the end of its range, so that there was this much at least.
+    """
 
     start: float
     end: float
     why: str
+    saturated: bool = False
 
 
 def in_missing(time: Array, missing: Sequence[Missing], margin: float = 0.0) -> NDArray[np.bool_]:

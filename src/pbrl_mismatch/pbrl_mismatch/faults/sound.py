@@ -180,10 +180,11 @@ def _felt(stream: WrenchStream, grasps: list[Grasp], what: str, missing: list[Mi
     for axis, at in saturated(stream, held).items():
         unit = "N" if axis.startswith("force") else "N m"
         values = (stream.force if axis.startswith("force") else stream.torque)[at]
-        end = float(np.abs(values[:, "xyz".index(axis[-1])]).max())
-        why = f"{what}: {axis} was at the end of its range, {end:.3g} {unit}"
+        most = float(np.abs(values[:, "xyz".index(axis[-1])]).max())
+        why = f"{what}: {axis} was at the end of its range, {most:.3g} {unit}"
         for row in np.flatnonzero(at & held).tolist():
-            _add(missing, grasps, float(time[max(row - 1, 0)]), float(time[min(row + 1, len(time) - 1)]), why)
+            start, end = float(time[max(row - 1, 0)]), float(time[min(row + 1, len(time) - 1)])
+            _add(missing, grasps, start, end, why, saturated=True)
     period = float(np.median(np.diff(time)))
     gaps = list(_gaps(time, min(max(WRENCH_GAP, USUAL_PERIODS * period), LONGEST_GAP)))
     for start, end in gaps:
@@ -236,13 +237,15 @@ def _filled(stream: WrenchStream, gaps: list[tuple[float, float]]) -> WrenchStre
     return replace(stream, time=time, force=across(stream.force), torque=across(stream.torque))
 
 
-def _add(missing: list[Missing], grasps: list[Grasp], start: float, end: float, why: str) -> None:
+def _add(
+    missing: list[Missing], grasps: list[Grasp], start: float, end: float, why: str, *, saturated: bool = False
+) -> None:
     """Add a stretch if anything was held in it; one that is close to the last of its kind lengthens that."""
     if not any(grasp.start < end and grasp.end > start for grasp in grasps):
         return
     start, end = start - MARGIN, end + MARGIN
     own = next((k for k in range(len(missing) - 1, -1, -1) if missing[k].why == why), None)
     if own is not None and start - missing[own].end < TOGETHER:
-        missing[own] = Missing(missing[own].start, max(missing[own].end, end), why)
+        missing[own] = Missing(missing[own].start, max(missing[own].end, end), why, saturated)
     else:
-        missing.append(Missing(start, end, why))
+        missing.append(Missing(start, end, why, saturated))

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from pbrl_control.constraints.object_model import ObjectModel
 from pbrl_control.navigation.footprint import reaching_arms
 from pbrl_control.planar import Array
-from pbrl_model.engines.contact_world import contact_scene, frame_poses, rollout_contact, start_states
+from pbrl_model.engines.contact_world import ContactScene, contact_scene, frame_poses, rollout_contact, start_states
 from pbrl_model.errors import ModelError
-from pbrl_model.geometry import mass_properties
+from pbrl_model.geometry import MassProperties, mass_properties
 from pbrl_model.parameters import BodyParameters
 from pbrl_namo.errors import NamoError
 from pbrl_namo.manipulation.settings import ManipulationSettings
@@ -97,6 +97,7 @@ class ContactWorlds:
             ]
         )
         self._arms = reaching_arms(settings.grasping.home[1])
+        self._held: dict[bytes, tuple[ContactScene, ContactScene, MassProperties]] = {}
 
     def carry(self, base: Array, motions: Sequence[tuple[Array, float]]) -> Carried:
         """Carry the held thing along.
@@ -108,18 +109,11 @@ class ContactWorlds:
         Raises:
             NamoError: some world cannot be followed, or the arms do not reach the thing.
         """
-        outline = self._outline(base)
-        told = mass_properties(outline)
+        place, free, told = self._with(base)
         scene, others = self._scene, self._others
         heavy = BodyParameters(mass=HEAVY, mu_ground=0.0).to_vector()
         count = len(self._rows)
         rows = np.concatenate((self._rows, np.tile([*heavy, 0.0, CONTACT_FRICTION], (count, 1, 1))), axis=1)
-        place = contact_scene(
-            [*(scene.movable[each].footprint for each in others), outline],
-            self._walls,
-            properties=[*(None for _ in others), told],
-        )
-        free = contact_scene([outline], properties=[told])
         poses = np.array([*(scene.poses[each] for each in others), scene.poses[self._name]], dtype=float)
         state = np.repeat(start_states(place, poses)[None], count, axis=0)
         peak = np.zeros(count)
@@ -142,6 +136,17 @@ class ContactWorlds:
             state[:, :, 3:] = 0.0
         ends = frame_poses(place, state)
         return Carried({each: ends[:, k] for k, each in enumerate(others)}, peak, ends[0, -1])
+
+    def _with(self, base: Array) -> tuple[ContactScene, ContactScene, MassProperties]:
+        """Return everything and what is held by a base (3,), the latter alone, and how its mass lies."""
+        key = np.asarray(base, dtype=float).tobytes()
+        if key not in self._held:
+            outline = self._outline(base)
+            told = mass_properties(outline)
+            things = [*(self._scene.movable[each].footprint for each in self._others), outline]
+            place = contact_scene(things, self._walls, properties=[*(None for _ in self._others), told])
+            self._held[key] = place, contact_scene([outline], properties=[told]), told
+        return self._held[key]
 
     def _outline(self, base: Array) -> Array:
         """Return the outline (k, 2) of robot, arms and what they hold, in the thing's frame."""

@@ -39,8 +39,8 @@ GRASPS = 6
 """That are tried."""
 LENGTHS = (0.0, 0.5, 1.0)
 """Shares of what is left of a motion once a way would be open with nothing else there: what is pushed has to go too."""
-MOST = 40
-"""Ways that are followed, the shortest first."""
+MOST, ALL = 40, 80
+"""Ways that are followed, the shortest first: of one opening, and of all together."""
 PUSHED = 3
 """Things that may be pushed: of a heap nobody knows how it goes on."""
 SURE = 0.75
@@ -79,6 +79,7 @@ class PushingThrough:
     ) -> None:
         self._yard, self._scene = yard, yard.scene
         self._free, self._study, self._settings = free, study, settings
+        self._left = ALL
 
     def find(self, closers: Sequence[Opening], target: Array) -> Estimate | None:
         """Return what to expect of pushing something through; None where nothing helps.
@@ -89,7 +90,7 @@ class PushingThrough:
             closers: openings from the robot's region that could not be made.
             target: (2,) in `world` to which a way is to be open [m].
         """
-        found = (self._for(opening, target) for opening in closers)
+        found = (self._for(opening, target) for opening in closers if self._left > 0)
         return next((each for each in found if each is not None), None)
 
     def _for(self, opening: Opening, target: Array) -> Estimate | None:
@@ -110,6 +111,7 @@ class PushingThrough:
         )
         best, limit = None, settings.constraints.grip_force
         for step in self._ways(opening, study, grasps, mobile, target):
+            self._left -= 1
             spare = limit - self._own(study, step)
             if self._followed(few, name, mobile, step, target, spare) is None:
                 continue
@@ -159,7 +161,9 @@ class PushingThrough:
             for c, g in zip(*np.nonzero(first.opened), strict=True)
             for share in LENGTHS
         ]
-        yield from sorted((step for step in found if step.way > SHORT), key=lambda step: step.way)[:MOST]
+        yield from sorted((step for step in found if step.way > SHORT), key=lambda step: step.way)[
+            : min(MOST, self._left)
+        ]
 
     def _own(self, study: Study, step: Step) -> float:
         """Return the sum of the grips' forces that what is held most likely takes [N]; NaN: it would not obey."""
