@@ -188,6 +188,18 @@ def test_a_base_that_is_pushed_away_and_one_that_does_not_move_are_given_up() ->
     assert commands[-1].v == 0.0
 
 
+@pytest.mark.parametrize("path", [straight(), BasePath(np.zeros(3), np.array([0.0, 0.0, 2.0]), ())])
+def test_a_base_that_strains_against_something_unseen_is_given_up_though_its_pose_jitters(
+    path: BasePath, rng: np.random.Generator
+) -> None:
+    tracker = PathTracker(path, LIMITS)
+    commands = [tracker.step(0.02 * i, rng.normal(0.0, 0.004, 3)) for i in range(600)]
+    assert commands[-1].status is TrackStatus.FAILED
+    assert "is something that is not on the map in the way?" in commands[-1].reason
+    given_up = next(i for i, command in enumerate(commands) if command.status is TrackStatus.FAILED)
+    assert 0.02 * given_up < 6.0
+
+
 def test_an_end_missed_by_more_than_the_tolerance_is_no_arrival() -> None:
     path = BasePath(np.zeros(3), np.zeros(3), ())
     command = Unicycle(np.array([0.05, 0.0, 0.0])).follow(PathTracker(path, LIMITS))

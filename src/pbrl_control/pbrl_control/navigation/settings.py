@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from pydantic import Field
+
 from pbrl_control.settings import NotNegative, Positive, Section
 
 
@@ -21,6 +25,8 @@ class TrackerSettings(Section):
     stall: Positive = 3.0  # [s] without motion though motion is commanded
     creeping: Positive = 0.005  # [m/s, rad/s] below which no motion is expected
     budge: Positive = 0.003  # [m, rad] that counts as motion
+    headway: Positive = 5.0  # [s] of driving or turning after which it is looked how far that has led
+    got_on: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.25  # share of what was commanded that it has to have led
 
 
 class LocalizerSettings(Section):

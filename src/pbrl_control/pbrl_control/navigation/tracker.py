@@ -27,6 +27,7 @@ from pbrl_control.settings import BaseSettings
 LONGEST_PERIOD = 0.1  # [s] that a command is reckoned to have lasted at most
 BRAKE_SHARE = 0.4  # of the acceleration limit, that braking ahead of an end is planned with
 APPROACH_RATE = 2.0  # [1/s] speed near an end for each metre or radian left
+FAR = 0.2  # [m, rad] commanded, below which nobody asks where it led
 SLOW, STILL = 0.02, 1e-3  # [m/s, rad/s] no longer under way; standing
 
 
@@ -47,6 +48,24 @@ class TrackCommand:
     omega: float
     status: TrackStatus
     reason: str = ""
+
+
+@dataclass
+class _Stretch:
+    """A while of driving or turning on one leg.
+
+    Attributes:
+        doing: number of the leg, and whether it is driven or turned on.
+        since, last: from when until when it is counted [s].
+        here: (3,) where it began [m, rad].
+        commanded: how far the commands went [m or rad].
+    """
+
+    doing: tuple[int, bool]
+    since: float
+    last: float
+    here: Array
+    commanded: float = 0.0
 
 
 class PathTracker:
@@ -76,6 +95,7 @@ class PathTracker:
         self._last: float | None = None
         self._trouble: float | None = None  # [s] since when it stands and waits
         self._progress: tuple[float, Array] | None = None
+        self._stretch: _Stretch | None = None
         self._ended: tuple[TrackStatus, str] | None = None
 
     def update_map(self, checker: MotionChecker) -> None:
@@ -110,7 +130,7 @@ class PathTracker:
 
     def _wait(self, now: float, dt: float, reason: str) -> TrackCommand:
         """Stand; give up when it lasts too long."""
-        self._progress = None
+        self._progress = self._stretch = None
         self._trouble = now if self._trouble is None else self._trouble
         if now - self._trouble > self._settings.patience:
             return self._end(dt, TrackStatus.FAILED, f"{reason}, for more than {self._settings.patience} s")
@@ -139,7 +159,30 @@ class PathTracker:
             self._progress = (now, here)
         elif now - self._progress[0] > self._settings.stall:
             return f"base: expected to move as commanded, has stood for {self._settings.stall} s"
-        return ""
+        return self._headway(now, here)
+
+    def _headway(self, now: float, here: Array) -> str:
+        """Say where driving leads nowhere: slipping wheels and jittering poses look like motion from tick to tick."""
+        doing = (self._leg, self._driving)
+        if self._stretch is None or self._stretch.doing != doing:
+            self._stretch = _Stretch(doing, now, now, here)
+        stretch, settings = self._stretch, self._settings
+        stretch.commanded += abs(float(self._velocity[0 if self._driving else 1])) * min(
+            now - stretch.last, LONGEST_PERIOD
+        )
+        stretch.last = now
+        if now - stretch.since < settings.headway:
+            return ""
+        came = _distance(here, stretch.here) if self._driving else abs(wrap(float(here[2] - stretch.here[2])))
+        asked = stretch.commanded
+        self._stretch = None
+        if came >= settings.got_on * asked or asked < FAR:
+            return ""
+        unit = "m" if self._driving else "rad"
+        return (
+            f"base: expected to come {asked:.2f} {unit} in {settings.headway:g} s, came {came:.2f}; is something that "
+            "is not on the map in the way?"
+        )
 
     @property
     def _current(self) -> Leg | None:
