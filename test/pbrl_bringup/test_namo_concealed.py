@@ -65,6 +65,8 @@ def test_the_first_thing_that_is_planned_meets_what_is_concealed(kind: str) -> N
         assert all(stop.beyond(poses[0]) < 0.0 for stop in meeting.stops)
         assert meeting.solid is None or not meeting.solid.intersects(seen.outlines[SQUARE])
     assert all(np.isfinite(shape).all() for shape in room.outlines())
+    assert bool(room.cords()) == (kind == TETHER)
+    assert bool(room.outlines()) == (kind != TETHER)
 
 
 def test_no_caster_stands_on_the_carpet_until_the_first_one_comes_to_its_edge() -> None:
@@ -121,7 +123,8 @@ def test_rows_count_both_learners_in_the_same_rooms() -> None:
 def test_both_strips_are_drawn_with_what_is_concealed(tmp_path: Path) -> None:
     shapes = [np.array([[3.0, 1.0], [4.0, 1.0], [4.0, 2.0]])]
     assert draw(outcome(True), tmp_path, shapes).name == "figure.png"
-    assert draw(outcome(False), tmp_path, shapes, "plain").name == "plain.png"
+    cords = {SQUARE: np.array([[0.0, 0.0], [1.0, 0.5]])}
+    assert draw(outcome(False), tmp_path, shapes, "plain", cords=cords).name == "plain.png"
     assert (tmp_path / "plain.png").read_bytes().startswith(b"\x89PNG")
 
 

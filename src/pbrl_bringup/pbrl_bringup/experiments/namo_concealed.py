@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pbrl_bringup.benches.rows import Measured, Row, at_least
+from pbrl_bringup.experiments.figures import FIGURE
 from pbrl_bringup.experiments.kept import kept_run
 from pbrl_bringup.experiments.namo_concealed_rooms import Concealing, draw_concealing
 from pbrl_bringup.experiments.namo_concealing import KINDS
@@ -90,9 +91,9 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
     runs = in_parallel(trial, trials, "runs")
     pairs = [Pair(KINDS[k % len(KINDS)], runs[2 * k], runs[2 * k + 1]) for k in range(count)]
     shown = next((k for k, pair in enumerate(pairs) if pair.asked.reached and not pair.plain.reached), 0)
-    concealed = room_of(seed, shown).outlines()
-    draw(pairs[shown].asked, out, concealed)
-    draw(pairs[shown].plain, out, concealed, "plain")
+    room = room_of(seed, shown)
+    for run, name in ((pairs[shown].asked, FIGURE), (pairs[shown].plain, "plain")):
+        draw(run, out, room.outlines(), name, cords=room.cords())
     return Measured(rows_of(pairs), {"rooms": [told(pair) for pair in pairs]})
 
 

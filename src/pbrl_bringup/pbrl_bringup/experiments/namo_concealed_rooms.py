@@ -18,7 +18,7 @@ import shapely
 from bullet_sim.scene import Scene
 from bullet_sim.settings import parse_settings
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.experiments.namo_concealing import Meeting, Points, at, conceal
+from pbrl_bringup.experiments.namo_concealing import Meeting, Points, conceal
 from pbrl_bringup.experiments.namo_rooms import DRAWS, GOAL, HEIGHT, MASSES, SIZES, SQUARE, closed, outline_of
 from pbrl_control.planar import Array, compose, inverse
 from pbrl_model.parameters import BodyParameters
@@ -60,13 +60,14 @@ class Concealing:
     seed: int
 
     def outlines(self) -> list[Array]:
-        """Return the corners (k, 2) of what is concealed, of a tether its two ends, in `world` [m]."""
-        concealed, pose = self.scene.concealed, np.array(self.scene.bodies[SQUARE].pose)
+        """Return the corners (k, 2) of what is concealed and lies or stands on the floor, in `world` [m]."""
+        concealed = self.scene.concealed
         found = [np.array(tile.polygon) for tile in concealed.floor_patch]
-        found += [np.array(body.polygon) + np.array(body.pose[:2]) for body in concealed.unseen_body]
-        for cord in concealed.tether.values():
-            found.append(np.array([cord.anchor[:2], at(np.array([cord.point[:2]]), pose)[0]]))
-        return found
+        return found + [np.array(body.polygon) + np.array(body.pose[:2]) for body in concealed.unseen_body]
+
+    def cords(self) -> dict[str, Array]:
+        """Return where a cord is tied to a thing, in its frame, and hooked, in `world` (2, 2), by thing [m]."""
+        return {name: np.array([cord.point[:2], cord.anchor[:2]]) for name, cord in self.scene.concealed.tether.items()}
 
 
 def draw_concealing(rng: np.random.Generator, kind: str) -> Concealing:

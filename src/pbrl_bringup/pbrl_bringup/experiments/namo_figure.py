@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from itertools import compress, pairwise
 from pathlib import Path
@@ -33,9 +34,11 @@ SHOWN = {
 MOST, COLUMNS = 12, 3
 INSTANT = 0.05
 """[s] within which two pictures show the same: the first is kept, which says why."""
-SAID = ("AskMismatch",)
+SAID = ("AskMismatch", "Failed")
 """States with a picture for what is written below it."""
-CONCEALED = "#c2185b"
+CONCEALED, FAINT = "#c2185b", "#c2185b18"
+WIDE, LINES = 150, 2
+"""Letters of a line above all pictures, and lines that what became of the run may take there."""
 MOVED = 0.02
 """[m] and [rad] together from which on a thing is drawn where it was before."""
 
@@ -46,6 +49,7 @@ def draw(
     concealed: Sequence[Array] = (),
     name: str = FIGURE,
     braked: Mapping[str, Sequence[Sequence[float]]] = MappingProxyType({}),
+    cords: Mapping[str, Array] = MappingProxyType({}),
 ) -> Path:
     """Draw a run into a folder as `figure.png`.
 
@@ -55,6 +59,7 @@ def draw(
         concealed: (k, 2) corners of what only the simulator knows [m].
         name: of the file, without its ending.
         braked: (x, y) of the casters of each thing that are locked, in its own frame [m].
+        cords: (2, 2) where each thing has a cord tied to it, in its frame, and where that is hooked, in `world` [m].
     """
     shown = [each for each in run.moments if each.state in SHOWN]
     later = [now.state in SAID or now.time > before.time + INSTANT for before, now in pairwise(shown)]
@@ -72,8 +77,11 @@ def draw(
             x, y = _placed(casters, moment.poses[thing]).T
             axes.plot(x, y, ls="", marker="o", color=CONCEALED, ms=3.5)
         for shape in concealed:
-            axes.add_patch(Polygon(shape, closed=True, fc="none", ec=CONCEALED, lw=1.2, ls="--"))
-    _note(figure, run, bool(concealed or braked))
+            axes.add_patch(Polygon(shape, closed=True, fc=FAINT, ec=CONCEALED, lw=1.2, ls="--"))
+        for thing, (tied, hook) in cords.items():
+            x, y = np.array([hook, _placed([tied], moment.poses[thing])[0]]).T
+            axes.plot(x, y, color=CONCEALED, lw=1.2, marker="o", ms=3.0, markevery=[0])
+    _note(figure, run, bool(concealed or braked or cords))
     return save(figure, out, name)
 
 
@@ -119,8 +127,9 @@ def _short(sentence: str, most: int = 62) -> str:
 
 def _note(figure: Figure, run: NamoOutcome, hidden: bool) -> None:
     planned, updates = run.rows["overall planning time [s]"], run.rows["calls to UpdateModel"]
+    became = f"{run.seconds:.0f} s simulated, {planned:.2f} s of planning, {updates:.0f} model updates: {run.sentence}"
     figure.suptitle(
-        f"{run.seconds:.0f} s simulated, {planned:.2f} s of planning, {updates:.0f} model updates: {run.sentence}"
+        textwrap.fill(became, WIDE, max_lines=LINES, placeholder="...")
         + ("\n(red: locked casters and what else nobody told the robot; dotted: where it was)" if hidden else ""),
         fontsize=10,
     )
