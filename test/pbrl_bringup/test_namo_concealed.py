@@ -13,11 +13,11 @@ from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments import namo_concealed, namo_concealed_rooms
 from pbrl_bringup.experiments.namo_concealed import REPAIRED, SURPRISES, Pair, rows_of
 from pbrl_bringup.experiments.namo_concealed_rooms import FREE, HEAVY, PASSAGE, Concealing, draw_concealing, seen_room
-from pbrl_bringup.experiments.namo_concealing import CARPET, CASTERS, KINDS, TETHER, UNSEEN, at, conceal, track
+from pbrl_bringup.experiments.namo_concealing import CARPET, CASTERS, KINDS, TETHER, UNSEEN, conceal, track
 from pbrl_bringup.experiments.namo_figure import draw
 from pbrl_bringup.experiments.namo_rooms import SQUARE
 from pbrl_bringup.namo_run import Moment, NamoOutcome
-from pbrl_control.planar import compose, inverse
+from pbrl_control.planar import compose, inverse, placed
 from pbrl_namo.executive import State
 from pbrl_namo.executive.mission import job_seed
 from pbrl_namo.manipulation.plan import ManipulationPlan
@@ -76,7 +76,7 @@ def test_no_caster_stands_on_the_carpet_until_the_first_one_comes_to_its_edge() 
     tile = shapely.Polygon(meeting.concealed["floor_patch"][0]["polygon"])
     poses = track(seen, what)
     met = int(np.argmin(np.abs(poses - meeting.pose).sum(axis=1)))
-    on = [[bool(shapely.intersects_xy(tile, *caster)) for caster in at(CASTERS, pose)] for pose in poses]
+    on = [[bool(shapely.intersects_xy(tile, *caster)) for caster in placed(CASTERS, pose)] for pose in poses]
     assert not np.any(on[:met])
     assert np.any(on[met + 1 :])
 

@@ -24,6 +24,11 @@ def rotation(theta: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
+def placed(points: Array, pose: Array) -> Array:
+    """Return where points (k, 2) of a body are in `world` with its frame at a pose (3,) [m, rad]."""
+    return np.asarray(points @ rotation(float(pose[2])).T + pose[:2])
+
+
 def compose(a: Array, b: Array) -> Array:
     """Return the pose (3,) of c in the frame of a's parent, given a, and b = c in the frame of a."""
     x, y = a[:2] + rotation(a[2]) @ b[:2]

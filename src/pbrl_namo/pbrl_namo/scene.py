@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from pbrl_control.navigation.floor_map import FloorMap, as_polygon
 from pbrl_control.navigation.footprint import KRANG_STOWED, Footprint
-from pbrl_control.planar import Array, rotation
+from pbrl_control.planar import Array, placed
 from pbrl_namo.errors import NamoError
 
 
@@ -35,7 +35,7 @@ class Movable:
 
     def at(self, pose: Array) -> Polygon:
         """Return the outline in `world` with its frame at a pose (3,) [m, rad]."""
-        return Polygon(self.footprint @ rotation(float(pose[2])).T + pose[:2])
+        return Polygon(placed(self.footprint, pose))
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from pbrl_bringup.experiments.body_jacobian_trials import Held
 from pbrl_bringup.experiments.figures import save
-from pbrl_bringup.experiments.robot_fits_trials import placed
-from pbrl_control.planar import compose
+from pbrl_control.planar import compose, placed
 
 Array = NDArray[np.float64]
 Reaches = Mapping[tuple[str, str], tuple[float, float]]

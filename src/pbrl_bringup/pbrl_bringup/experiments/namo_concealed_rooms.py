@@ -2,8 +2,8 @@
 
 A table on free casters and a cupboard close the room, so that the table has to be moved. What a planner who knows
 nothing of it would do first is worked out beforehand, and the effect is put where that motion meets it on its way. A
-room is kept where this takes to be known: who takes what was felt for the table's own weight runs into it again, who
-knows where it is has another way. Only the simulator is told.
+room is kept where this takes to be known: who takes what was felt for the table's own friction runs into it again, and
+who knows where it is has another way. Only the simulator is told.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import shapely
 from bullet_sim.scene import Scene
 from bullet_sim.settings import parse_settings
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.experiments.namo_concealing import Meeting, Points, conceal
+from pbrl_bringup.experiments.namo_concealing import Meeting, conceal
 from pbrl_bringup.experiments.namo_rooms import DRAWS, GOAL, HEIGHT, MASSES, SIZES, SQUARE, closed, outline_of
 from pbrl_control.planar import Array, compose, inverse
 from pbrl_model.parameters import BodyParameters
@@ -127,7 +127,7 @@ def seen_room(pose: Array, start: Array, goal: Array) -> NamoScene:
     return NamoScene.of(_room(), {CUPBOARD: np.array(CLOSET)}, movable, {SQUARE: pose}, start, goal)
 
 
-def _room() -> Points:
+def _room() -> Array:
     (low, high), y = LENGTH, HALF_WIDTH
     return np.array([[low, -y], [high, -y], [high, y], [low, y]])
 

@@ -11,17 +11,14 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments.namo_rooms import HEIGHT, SIZES, SQUARE, outline_of
-from pbrl_control.planar import Array, compose, inverse, rotation
+from pbrl_control.planar import Array, compose, inverse, placed, rotation
 from pbrl_namo.beliefs.stops import Stop
 from pbrl_namo.manipulation.plan import ManipulationPlan
 from pbrl_namo.manipulation.plane_kernel import moved
 from pbrl_namo.scene import NamoScene
-
-Points = NDArray[np.float64]
 
 CARPET, TETHER, UNSEEN = "carpet edge", "tether", "unseen body"
 KINDS = (CARPET, TETHER, UNSEEN)
@@ -120,7 +117,7 @@ def conceal(kind: str, scene: NamoScene, what: ManipulationPlan, share: float, k
 
 def _carpet(poses: Array, met: int) -> Meeting | None:
     """Return a carpet that the casters come to then and no sooner, the one that the motion would go furthest onto."""
-    casters = np.array([at(CASTERS, pose) for pose in poses])
+    casters = np.array([placed(CASTERS, pose) for pose in poses])
     best, score = None, 0.0
     for angle in np.linspace(-math.pi, math.pi, EDGES, endpoint=False):
         ahead = np.array([math.cos(angle), math.sin(angle)])
@@ -184,13 +181,8 @@ def _pallet(
     return None
 
 
-def at(points: Points, pose: Array) -> Points:
-    """Return points (n, 2) of the table in `world` with it at a pose (3,) [m, rad]."""
-    return np.asarray(points @ rotation(float(pose[2])).T + pose[:2])
-
-
-def _corners(pose: Array) -> Points:
-    return at(outline_of(SQUARE), pose)
+def _corners(pose: Array) -> Array:
+    return placed(outline_of(SQUARE), pose)
 
 
 def _velocity(before: Array, after: Array, point: Array) -> tuple[float, Array]:
@@ -204,7 +196,7 @@ def _velocity(before: Array, after: Array, point: Array) -> tuple[float, Array]:
 def _block(middle: Array, ahead: Array, length: float) -> shapely.Polygon:
     across = np.array([[0.5 * DEPTH, 0.5 * length], [-0.5 * DEPTH, 0.5 * length]])
     corners = np.concatenate((across, -across))
-    return shapely.Polygon(at(corners, np.array([*middle, math.atan2(ahead[1], ahead[0])])))
+    return shapely.Polygon(placed(corners, np.array([*middle, math.atan2(ahead[1], ahead[0])])))
 
 
 def _told(block: shapely.Polygon) -> dict[str, Any]:

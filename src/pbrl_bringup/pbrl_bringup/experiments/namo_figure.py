@@ -17,7 +17,7 @@ from matplotlib.patches import Polygon
 from pbrl_bringup.experiments.figures import FIGURE, canvas, save
 from pbrl_bringup.namo_run import Moment, NamoOutcome
 from pbrl_control.navigation.footprint import KRANG_STOWED
-from pbrl_control.planar import Array, rotation
+from pbrl_control.planar import Array, placed
 
 COLOURS = ("#d98b3a", "#3a7bd9", "#5aa469", "#a05aa4")
 SHOWN = {
@@ -74,12 +74,12 @@ def draw(
         if k:
             _where_it_was(axes, moments[k - 1], moment, run)
         for thing, casters in braked.items():
-            x, y = _placed(casters, moment.poses[thing]).T
+            x, y = placed(np.array(casters), np.array(moment.poses[thing])).T
             axes.plot(x, y, ls="", marker="o", color=CONCEALED, ms=3.5)
         for shape in concealed:
             axes.add_patch(Polygon(shape, closed=True, fc=FAINT, ec=CONCEALED, lw=1.2, ls="--"))
         for thing, (tied, hook) in cords.items():
-            x, y = np.array([hook, _placed([tied], moment.poses[thing])[0]]).T
+            x, y = np.array([hook, placed(tied, np.array(moment.poses[thing]))]).T
             axes.plot(x, y, color=CONCEALED, lw=1.2, marker="o", ms=3.0, markevery=[0])
     _note(figure, run, bool(concealed or braked or cords))
     return save(figure, out, name)
@@ -89,9 +89,8 @@ def _picture(axes: Axes, moment: Moment, number: int, run: NamoOutcome) -> None:
     corners = np.array(run.room)
     axes.add_patch(Polygon(corners, closed=True, fc="#fafafa", ec="#444", lw=1.5))
     for k, (name, pose) in enumerate(moment.poses.items()):
-        axes.add_patch(
-            Polygon(_placed(run.outlines[name], pose), closed=True, fc=COLOURS[k % len(COLOURS)], ec="#333", alpha=0.75)
-        )
+        outline = placed(np.array(run.outlines[name]), np.array(pose))
+        axes.add_patch(Polygon(outline, closed=True, fc=COLOURS[k % len(COLOURS)], ec="#333", alpha=0.75))
     robot = KRANG_STOWED.at(np.array(moment.base))
     axes.add_patch(Polygon(robot, closed=True, fc="#555", ec="#111"))
     x, y, heading = moment.base
@@ -113,12 +112,8 @@ def _where_it_was(axes: Axes, before: Moment, now: Moment, run: NamoOutcome) -> 
     """Draw where a thing stood in the picture before, if it has been moved since."""
     for name, pose in before.poses.items():
         if math.dist(pose, now.poses[name]) > MOVED:
-            was = _placed(run.outlines[name], pose)
+            was = placed(np.array(run.outlines[name]), np.array(pose))
             axes.add_patch(Polygon(was, closed=True, fc="none", ec="#888", lw=0.8, ls=":"))
-
-
-def _placed(points: Sequence[Sequence[float]], pose: Sequence[float]) -> Array:
-    return np.asarray(np.array(points) @ rotation(pose[2]).T + np.array(pose[:2]))
 
 
 def _short(sentence: str, most: int = 62) -> str:

@@ -15,7 +15,8 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from pbrl_bringup.experiments.figures import save
-from pbrl_bringup.experiments.robot_fits_trials import EndError, Overlay, Trial, placed
+from pbrl_bringup.experiments.robot_fits_trials import EndError, Overlay, Trial
+from pbrl_control.planar import placed
 
 Array = NDArray[np.float64]
 Drawn = Mapping[tuple[str, str], tuple[Trial, Overlay]]

@@ -16,6 +16,7 @@ from pbrl_bag import read_recording
 from pbrl_bringup.benches.wheel import locked_contacts
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.simulate import simulate_push
+from pbrl_control.planar import placed
 from pbrl_control.push_plan import load_plan
 from pbrl_model.fitting.fit import FitOptions, fit_recording, motions_of
 from pbrl_model.geometry import MassProperties, mass_properties
@@ -194,12 +195,6 @@ def end_error(path: Array, recorded: Array, outline: Array) -> EndError:
         float(abs(first[2] - second[2])),
         float(np.sqrt(np.mean(np.sum(corners**2, axis=-1)))),
     )
-
-
-def placed(points: Array, pose: Array) -> Array:
-    """Return points (k, 2) of a body at a pose (3,) in `world`."""
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    return points @ np.array([[c, s], [-s, c]]) + pose[:2]
 
 
 def holding_casters(scene: Scene, name: str) -> tuple[Array, bool]:
