@@ -7,11 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from shapely import Polygon
 
 from pbrl_control.fetching import FetchExecutive, FetchSettings, GraspChoice, SampledGrasps
 from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.grasping import GraspSettings
 from pbrl_control.kinematics import GRIP, SIDES, Posture, RobotKinematics
+from pbrl_control.navigation import KRANG_STOWED
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag
 from pbrl_control.planar import compose, inverse, turn, wrap
 from pbrl_control.push import GripperAnswer, Phase, PushCommand
@@ -41,6 +43,7 @@ class World:
         happens: called at each tick with this world, for what goes wrong at some moment.
         grips_hold: whether closed hands really hold; `slips`: share of a pull that they slide over the edge.
         friction: [N] that the table resists with at each hand.
+        unseen: what stops the base and is on no map, in `world`.
     """
 
     kinematics: RobotKinematics
@@ -59,6 +62,7 @@ class World:
     grips_hold: bool = True
     slips: float = 0.0
     friction: float = 3.0
+    unseen: Polygon = field(default_factory=Polygon)
     time: float = 0.0
     grips: dict[str, Grip] = field(default_factory=dict)
     hands: dict[str, np.ndarray] = field(default_factory=dict)  # x, y, yaw, height of plates, once lowered
@@ -121,9 +125,13 @@ class World:
         assert twist.vy == 0.0
         if command.phase in (Phase.LOCATE, Phase.DRIVE):
             self.hands = {}
-        if self.base_moves:
-            step = DT * turn(twist.array(), self.base[2] + 0.5 * DT * twist.omega)
-            self.base = np.array([*(self.base[:2] + step[:2]), wrap(self.base[2] + step[2])])
+        self._go(DT * turn(twist.array(), self.base[2] + 0.5 * DT * twist.omega))
+
+    def _go(self, step: np.ndarray) -> None:
+        """Move the base by a step (3,), unless something is in the way."""
+        there = np.array([*(self.base[:2] + step[:2]), wrap(float(self.base[2] + step[2]))])
+        if self.base_moves and not self.unseen.intersects(Polygon(KRANG_STOWED.at(there))):
+            self.base = there
 
     def _move_hands(self, command: PushCommand) -> None:
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):

@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from room_of_fakes import NOMINAL, SETTINGS, STOWED, TABLE, World, fetching, plan_for
+from shapely import Point
 
 from pbrl_control.course import CourseStep
 from pbrl_control.errors import ControlError
 from pbrl_control.fetching import FetchExecutive, GivenGrips
 from pbrl_control.kinematics import Posture, RobotKinematics
 from pbrl_control.loop import ControlLoop
+from pbrl_control.navigation import Struck
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag
 from pbrl_control.push import GripperAnswer, Phase
 from pbrl_control.settings import ControllerSettings
@@ -248,6 +250,22 @@ def test_a_base_that_is_stuck_is_said_to_be(world: World) -> None:
     command = world.run(fetching(world.kinematics))
     assert "expected to move as commanded, has stood" in command.status
     assert "gave up after 3 attempts" in command.status
+
+
+def test_what_nobody_sees_is_gone_round_once_it_was_struck(world: World) -> None:
+    free = world.kinematics, AWAY.copy()
+    plain = fetching(world.kinematics)
+    World(*free, joints=STOWED.copy()).run(plain)
+    assert plain.candidate is not None
+    leg = max(plain.candidate.path.legs, key=lambda leg: leg.length)
+    ahead = (leg.end - leg.start) / leg.length
+    world.unseen = Point(leg.start + 0.8 * ahead).buffer(0.05)  # beyond what the robot covers while it turns
+    struck = Struck()
+    fetch = fetching(world.kinematics, struck=struck)
+    command = world.run(fetch)
+    assert command.phase == Phase.DONE, command.status
+    assert "it is remembered as 'something unseen 1'" in fetch.troubles[0]
+    assert struck.outlines["something unseen 1"].distance(world.unseen) < 0.2
 
 
 BROKEN = ("tag", "posture", "odometry", "wrench", "scene")

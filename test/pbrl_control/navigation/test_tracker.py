@@ -198,6 +198,16 @@ def test_a_base_that_strains_against_something_unseen_is_given_up_though_its_pos
     assert "is something that is not on the map in the way?" in commands[-1].reason
     given_up = next(i for i, command in enumerate(commands) if command.status is TrackStatus.FAILED)
     assert 0.02 * given_up < 6.0
+    assert commands[-1].struck == (1 if path.legs else 0)
+
+
+def test_which_way_it_was_going_when_something_stopped_it_is_told() -> None:
+    back = PathTracker(
+        BasePath(np.zeros(3), np.zeros(3), (Leg(np.array([0.0, 0.0]), np.array([-2.0, 0.0]), True),)), LIMITS
+    )
+    assert [back.step(0.02 * i, np.zeros(3)) for i in range(600)][-1].struck == -1
+    pushed = PathTracker(straight(), LIMITS)
+    assert pushed.step(0.0, np.array([0.0, 0.2, 0.0])).struck == 0
 
 
 def test_an_end_missed_by_more_than_the_tolerance_is_no_arrival() -> None:

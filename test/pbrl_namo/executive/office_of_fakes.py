@@ -19,7 +19,7 @@ from pbrl_control.grasping import GraspSettings
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
 from pbrl_control.navigation import TrackerSettings
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag
-from pbrl_control.planar import compose, inverse, turn, wrap
+from pbrl_control.planar import compose, inverse, turn
 from pbrl_control.push import GripperAnswer, GripperRequest, Phase
 from pbrl_control.settings import BaseSettings, ControllerSettings
 from pbrl_control.trajectories.trajectory import MotionLimits
@@ -164,10 +164,7 @@ class Office(World):
         assert twist.vy == 0.0
         if twist.moves() and not self.grips:
             self.hands = {}
-        if self.base_moves:
-            step = DT * turn(twist.array(), self.base[2] + 0.5 * DT * twist.omega)
-            self.base = self.base + step
-            self.base[2] = wrap(self.base[2])
+        self._go(DT * turn(twist.array(), self.base[2] + 0.5 * DT * twist.omega))
 
     def _move_hands(self, order: Order) -> None:
         if not self.hands:

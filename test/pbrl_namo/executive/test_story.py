@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from office_of_fakes import DT, GOAL, SETTINGS, Brain, Office, executive_in, office
 from room_of_fakes import NOMINAL
+from shapely import Point
 from tampering import events, known, once
 
 from pbrl_control.kinematics import RobotKinematics
@@ -74,6 +75,20 @@ def test_a_goal_in_the_same_region_is_driven_to(world: Office) -> None:
     assert world.run(executive).state == State.DONE
     assert world.states == [State.LOOK, State.GET_READY, State.PLANNING, State.DRIVE_TO_GOAL, State.DONE]
     assert world.base == pytest.approx([-2.5, -1.5, 1.0], abs=0.05)
+
+
+def test_what_nobody_sees_is_gone_round_once_it_was_struck_and_forgotten_with_the_goal(
+    kinematics: RobotKinematics,
+) -> None:
+    world = office(kinematics, things={}, bodies={}, fixed={})
+    world.unseen = Point(0.5 * (world.base[:2] + GOAL[:2])).buffer(0.15)
+    executive = executive_in(world)
+    assert world.run(executive).state == State.DONE
+    assert Event.WAY_LOST in events(executive)
+    assert 1 <= len(executive.view.around.struck.outlines) <= 3
+    executive.aim(np.array([-2.5, -1.5, 1.0]))
+    world.tick(executive)
+    assert not executive.view.around.struck.outlines
 
 
 def test_an_empty_room_is_driven_through(kinematics: RobotKinematics) -> None:

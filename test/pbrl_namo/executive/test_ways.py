@@ -101,6 +101,17 @@ def test_openings_are_seen_when_they_are_wide_enough(kinematics: RobotKinematics
     assert not check(scene.moved({}, start=np.array([0.3, 1.55, 0.0])), targets), "it stands in the table"
 
 
+def test_an_opening_is_none_while_what_is_moved_stands_at_the_goal(kinematics: RobotKinematics) -> None:
+    scene, check = scene_of(office(kinematics)), OpenByFreeSpace(0.5, spare=0.0)
+    targets = np.array([[2.0, 0.0], [2.0, 1.5]])
+    away = np.array([-1.0, 1.55, 0.0])
+    assert check(scene.moved({"table_a": away}), targets)
+    beside = np.array([scene.goal[0] - 0.6, scene.goal[1], 0.0])
+    for heading in (math.nan, 0.0):
+        there = replace(scene, goal=np.array([*scene.goal[:2], heading]))
+        assert not check(there.moved({"table_a": beside}), targets)
+
+
 def test_a_grasp_is_good_until_somebody_moves(kinematics: RobotKinematics, rng: np.random.Generator) -> None:
     scene = scene_of(office(kinematics))
     candidate = find_grasp(GraspJob(scene, pull(), (), 5), SETTINGS.fetch.grasps).candidate

@@ -75,7 +75,10 @@ class Drive:
         if command.status == TrackStatus.FAILED and lost:
             raise ControlError(f"drive: {lost}; bring the grippers back into a camera's view, or check the odometry")
         if command.status == TrackStatus.FAILED and not blind:
-            raise WayLostError(f"drive: {command.reason}")
+            stopped, here = "", where.pose(now)
+            if command.struck and here is not None:
+                stopped = around.struck.add(self._floor, KRANG_STOWED, here, command.struck)
+            raise WayLostError(f"drive: {command.reason}" + (f"; it is remembered as {stopped!r}" if stopped else ""))
         sentence = f"waiting to see tag {name!r} again" if blind else lost or command.reason or "on the way"
         return PlanarTwist(vx=command.v, omega=command.omega), command.status == TrackStatus.ARRIVED, sentence
 

@@ -28,7 +28,7 @@ from pbrl_control.fetching.whereabouts import Whereabouts
 from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.grasping import GraspCandidate
 from pbrl_control.kinematics import ARM_JOINTS, SIDES, RobotKinematics
-from pbrl_control.navigation import KRANG_STOWED, MotionChecker
+from pbrl_control.navigation import KRANG_STOWED, MotionChecker, Struck
 from pbrl_control.percept import Percept
 from pbrl_control.planar import Array
 from pbrl_control.push import GripperAnswer, Phase, PushCommand, PushExecutive
@@ -50,6 +50,7 @@ class FetchExecutive:
         choice: which grasps to drive to; None: the plan's grips.
         course: what the object does once it is held for sure; None: it is let go again.
         seed: of grasp and route sampling.
+        struck: obstacles that nobody sees, remembered beyond this fetch; None: none yet.
 
     Attributes:
         plan: as given.
@@ -72,6 +73,7 @@ class FetchExecutive:
         choice: GraspChoice | None = None,
         course: Course | None = None,
         seed: int = 0,
+        struck: Struck | None = None,
     ) -> None:
         self.plan = plan
         self.phase = Phase.LOCATE
@@ -85,7 +87,7 @@ class FetchExecutive:
         self._course = course
         self._rng = np.random.default_rng(seed)
         self._where = Whereabouts(kinematics, self._settings.localizer)
-        self._around = Surroundings(self._settings.smoothing)
+        self._around = Surroundings(self._settings.smoothing, struck)
         self._drive: Drive | None = None
         self._push: PushExecutive | None = None
         self._test: ConfirmedCourse | None = None

@@ -1,4 +1,4 @@
-"""What stands around the robot, and where: room, built-in things as told, everything else as its tag shows it."""
+"""What stands around the robot, and where: room, built-in things as told, all else as its tag shows it or was felt."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from pbrl_control.navigation.floor_map import FloorMap
+from pbrl_control.navigation.struck import Struck
 from pbrl_control.percept import BodyShape, Percept, object_planar
 from pbrl_control.planar import Array, wrap
 
@@ -22,15 +23,20 @@ class Surroundings:
 
     Args:
         smoothing: [s] time constant of the average.
+        struck: what nobody sees, but the base has been stopped by; None: nothing yet.
+
+    Attributes:
+        struck: as given; what is added to it is on the map.
     """
 
-    def __init__(self, smoothing: float) -> None:
+    def __init__(self, smoothing: float, struck: Struck | None = None) -> None:
         self._smoothing = smoothing
+        self.struck = Struck() if struck is None else struck
         self._room: Array | None = None
         self._fixed: dict[str, Array] = {}
         self._seen: dict[str, tuple[float, Array]] = {}  # time of the last tag [s] and averaged pose (3,)
         self._shapes: Mapping[str, BodyShape] = {}
-        self._drawn: tuple[dict[str, Array], FloorMap] | None = None
+        self._drawn: tuple[dict[str, Array], Mapping[str, shapely.Polygon], FloorMap] | None = None
 
     def told(self, room: Array | None, fixed: Mapping[str, Array]) -> None:
         """Take in what wears no tag.
@@ -71,9 +77,9 @@ class Surroundings:
         return self._shapes[name].height
 
     def beside(self, point: Array, within: float) -> list[str]:
-        """Return which bodies a point (2,) in `world` is in, or nearer to than `within` [m]."""
-        place = shapely.Point(point)
-        return [name for name, outline in self.floor().obstacles.items() if outline.dwithin(place, within)]
+        """Return which known bodies a point (2,) in `world` is in, or nearer to than `within` [m]."""
+        place, outlines = shapely.Point(point), self.floor().obstacles
+        return [name for name in self._shapes if name in outlines and outlines[name].dwithin(place, within)]
 
     def unplaced(self) -> list[str]:
         """Return which known bodies have no pose."""
@@ -86,13 +92,15 @@ class Surroundings:
             ControlError: a body has no pose, or an outline is no polygon.
         """
         poses = {name: pose for name in self._shapes if (pose := self.pose(name)) is not None}
+        struck = self.struck.outlines
         if self._drawn is not None:
-            drawn, floor = self._drawn
-            same = drawn.keys() == poses.keys()
+            drawn, felt, floor = self._drawn
+            same = drawn.keys() == poses.keys() and felt is struck
             if same and not any(_apart(pose, drawn[name], REDRAW, REDRAW_YAW) for name, pose in poses.items()):
                 return floor
         floor = FloorMap.of_scene(self._room, self._shapes, poses)
-        self._drawn = (poses, floor)
+        floor = FloorMap(floor.room, {**floor.obstacles, **struck}) if struck else floor
+        self._drawn = (poses, struck, floor)
         return floor
 
 

@@ -7,6 +7,7 @@ from pbrl_control.navigation.motion import MotionChecker
 from pbrl_control.navigation.path import BasePath, Leg
 from pbrl_control.navigation.route import RouteResult, plan_route
 from pbrl_control.navigation.settings import LocalizerSettings, TrackerSettings
+from pbrl_control.navigation.struck import Struck
 from pbrl_control.navigation.tracker import PathTracker, TrackCommand, TrackStatus
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "MotionChecker",
     "PathTracker",
     "RouteResult",
+    "Struck",
     "TrackCommand",
     "TrackStatus",
     "TrackerSettings",

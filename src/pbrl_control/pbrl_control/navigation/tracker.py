@@ -42,12 +42,17 @@ class TrackStatus(StrEnum):
 
 @dataclass(frozen=True)
 class TrackCommand:
-    """Base velocities: v forward [m/s], omega [rad/s]; and, unless all is well, why, in one line."""
+    """Base velocities: v forward [m/s], omega [rad/s]; and, unless all is well, why, in one line.
+
+    Given up because something held the base up on a drive, `struck` is above zero where that went forwards, below it
+    where backwards, see `Struck.add`; else it is zero.
+    """
 
     v: float
     omega: float
     status: TrackStatus
     reason: str = ""
+    struck: int = 0
 
 
 @dataclass
@@ -97,6 +102,7 @@ class PathTracker:
         self._progress: tuple[float, Array] | None = None
         self._stretch: _Stretch | None = None
         self._ended: tuple[TrackStatus, str] | None = None
+        self._struck = 0
 
     def update_map(self, checker: MotionChecker) -> None:
         """Take in what is known of the floor now."""
@@ -116,8 +122,10 @@ class PathTracker:
         here = np.full(3, np.nan) if pose is None else np.array(pose, dtype=float)
         if here.shape != (3,) or not np.isfinite(here).all():
             return self._wait(now, dt, "pose of the base: lost" if pose is None else "pose of the base: not finite")
-        failure = self._failure(now, here)
-        if failure:
+        failure, held_up = self._off_path(here), self._held_up(now, here)
+        if failure or held_up:
+            self._struck = self._way if self._driving and not failure else 0
+            failure = failure or held_up
             return self._end(dt, TrackStatus.FAILED, failure)
         v, omega = self._wish(here)
         if self._ended:
@@ -147,13 +155,21 @@ class PathTracker:
         change = dt * np.array([limits.acceleration, limits.yaw_acceleration])
         wanted = np.clip([v, omega], -most, most)
         self._velocity = self._velocity + np.clip(wanted - self._velocity, -change, change)
-        return TrackCommand(float(self._velocity[0]), float(self._velocity[1]), status, reason)
+        return TrackCommand(float(self._velocity[0]), float(self._velocity[1]), status, reason, self._struck)
 
-    def _failure(self, now: float, here: Array) -> str:
-        """Return why there is no going on: too far from the path, or the base does not move."""
+    @property
+    def _way(self) -> int:
+        """Return which way the base drives: 1 forwards, -1 backwards."""
+        return -1 if self._velocity[0] < 0.0 else 1
+
+    def _off_path(self, here: Array) -> str:
+        """Return that the base is too far from the path, where it is."""
         off = _distance_from(self._current, here[:2]) if self._current else _distance(here, self._path.goal)
-        if off > self._settings.off_path:
-            return f"path: expected to stay within {self._settings.off_path} m of it, is {off:.2f} m away"
+        most = self._settings.off_path
+        return f"path: expected to stay within {most} m of it, is {off:.2f} m away" if off > most else ""
+
+    def _held_up(self, now: float, here: Array) -> str:
+        """Return that the base does not move as it is told to, where it does not."""
         moving = bool(np.abs(self._velocity).max() > self._settings.creeping)
         if self._progress is None or not moving or np.abs(here - self._progress[1]).max() > self._settings.budge:
             self._progress = (now, here)

@@ -43,10 +43,13 @@ class DriveToGoal(BasePart):
         if floor is not self._floor:
             self._floor = floor
             self._tracker.update_map(MotionChecker(floor, KRANG_STOWED))
-        command = self._tracker.step(now, self._view.where.pose(now))
+        here = self._view.where.pose(now)
+        command = self._tracker.step(now, here)
         if command.status == TrackStatus.ARRIVED:
             return Step("at the goal", Event.ARRIVED)
         if command.status == TrackStatus.FAILED:
+            if command.struck and here is not None:
+                self._view.around.struck.add(floor, KRANG_STOWED, here, command.struck)
             return Step(f"drive: {self._view.where.fault(now) or command.reason}", Event.WAY_LOST)
         twist = PlanarTwist(vx=command.v, omega=command.omega)
         return Step(command.reason or "on the way to the goal", None, Phase.DRIVE, {"base": twist})

@@ -248,6 +248,7 @@ class NamoExecutive:
         self.mission.manipulation, self.mission.planned, self.mission.grasp = held
         self.mission.surprised = surprised
         self._next_goal, self._begun = None, now
+        self.view.around.struck.forget()
 
     def _explain(self, before: State, event: Event, after: State, sentence: str, percept: Percept) -> None:
         """Keep why it has ended, or will as soon as what is held is let go."""

@@ -155,7 +155,13 @@ class Manipulation:
         choice = FoundGrasp(candidate, pose, settings)
         self._view, self._settings = view, settings
         self._fetch = FetchExecutive(
-            self.plan, kinematics, controller, settings.fetch, choice=choice, course=self.course
+            self.plan,
+            kinematics,
+            controller,
+            settings.fetch,
+            choice=choice,
+            course=self.course,
+            struck=view.around.struck,
         )
         view.tell(self._fetch)
 

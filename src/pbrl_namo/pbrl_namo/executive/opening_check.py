@@ -31,7 +31,8 @@ class OpenByFreeSpace:
     def __call__(self, scene: NamoScene, targets: Array) -> bool:
         """Say whether the robot can get from the scene's start to most of the points (k, 2) in `world` [m].
 
-        Points where there is no room for it any more do not count.
+        Points where there is no room for it any more do not count. Nor does an opening while what is moved stands
+        where the robot is to be in the end.
         """
         radius = drive_radius(scene.robot) if self._radius is None else self._radius
         free = free_space(scene, radius + self._spare)
@@ -41,4 +42,13 @@ class OpenByFreeSpace:
             return False
         places = free.indices(np.asarray(targets, dtype=float).reshape(-1, 2))
         known = places[places >= 0]
-        return len(known) > 0 and float(np.mean(known == here)) >= MOST
+        return len(known) > 0 and float(np.mean(known == here)) >= MOST and _may_end(scene, radius)
+
+
+def _may_end(scene: NamoScene, radius: float) -> bool:
+    """Say whether there is room at the goal."""
+    try:
+        region_of(scene, free_space(scene, radius), scene.goal, "goal")
+    except NamoError:
+        return False
+    return True
