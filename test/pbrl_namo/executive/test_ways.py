@@ -15,7 +15,9 @@ from pbrl_control.kinematics import RobotKinematics
 from pbrl_namo.errors import NamoError
 from pbrl_namo.executive import ExecutiveSettings, GraspJob, Move, OpenByFreeSpace
 from pbrl_namo.executive.manipulating import FoundGrasp, plan_of
+from pbrl_namo.executive.opening_check import stretch_of
 from pbrl_namo.executive.ways import find_grasp, find_way
+from pbrl_namo.regions import drive_radius
 from pbrl_namo.scene import NamoScene
 
 
@@ -110,6 +112,18 @@ def test_an_opening_is_none_while_what_is_moved_stands_at_the_goal(kinematics: R
     for heading in (math.nan, 0.0):
         there = replace(scene, goal=np.array([*scene.goal[:2], heading]))
         assert not check(there.moved({"table_a": beside}), targets)
+
+
+@pytest.mark.parametrize(("way", "stretch"), [(0.5, 1.3), (1.0, 1.14), (1.3, 1.3)])
+def test_nothing_is_moved_on_until_it_stands_at_the_goal(
+    way: float, stretch: float, kinematics: RobotKinematics
+) -> None:
+    """Room for the robot, 0.52 m, is left after 1.15 m."""
+    scene = scene_of(office(kinematics))
+    thing = scene.movable["table_a"].footprint[:, 0].max()
+    goal = np.array([scene.poses["table_a"][0] + 1.15 + thing + drive_radius(scene.robot), 1.55, math.nan])
+    move = pull(segments=((np.array([0.1, 0.0, 0.0]), 10.0 * way),))
+    assert stretch_of(move, replace(scene, goal=goal), 1.3) == pytest.approx(stretch, abs=1e-6)
 
 
 def test_a_grasp_is_good_until_somebody_moves(kinematics: RobotKinematics, rng: np.random.Generator) -> None:

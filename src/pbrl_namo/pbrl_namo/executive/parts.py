@@ -17,6 +17,7 @@ from pbrl_namo.executive.driving import DriveToGoal
 from pbrl_namo.executive.jobs import Answer, Job
 from pbrl_namo.executive.manipulating import Manipulation
 from pbrl_namo.executive.mission import Mission
+from pbrl_namo.executive.opening_check import stretch_of
 from pbrl_namo.executive.readying import GetReady
 from pbrl_namo.executive.releasing import Release
 from pbrl_namo.executive.settings import ExecutiveSettings
@@ -69,7 +70,7 @@ class Parts:
         if state == State.GET_READY:
             return GetReady(view, self._controller, settings)
         if state == State.NAVIGATE:
-            mission.manipulation = self._manipulation(mission)
+            mission.manipulation = self._manipulation(now, mission)
         if state in (State.NAVIGATE, State.GRASP, State.CLEAR):
             assert mission.manipulation is not None
             return mission.manipulation.part(state)
@@ -100,22 +101,26 @@ class Parts:
         phase = Phase.SETTLE if state in MAY_HOLD else Phase.LOCATE
         return Asking(Question(self._thinker, job, timeout, self._settings.jobs), take, what, phase)
 
-    def _manipulation(self, mission: Mission) -> Manipulation:
+    def _manipulation(self, now: float, mission: Mission) -> Manipulation:
         move, candidate, check = mission.planned.move, mission.grasp.candidate, self._opening
         assert move is not None and candidate is not None
         targets = np.asarray(move.targets, dtype=float).reshape(-1, 2)
+        scene = self._view.scene(now, mission.goal, mission.left_alone())
 
         def opened(_: float, percept: Percept) -> bool:
             scene = self._view.held_scene(percept, move.object, mission.goal)
             return check is not None and scene is not None and check(_without(scene, move.then), targets)
 
+        settings = self._settings
+        if move.object in scene.movable:
+            settings = settings.model_copy(update={"stretch": stretch_of(move, scene, settings.stretch)})
         return Manipulation(
             move,
             candidate,
             self._view,
             self._kinematics,
             self._controller,
-            self._settings,
+            settings,
             None if check is None else opened,
         )
 
