@@ -192,15 +192,12 @@ def free_start(lattice: Lattice, pose: Array, near: int = NEAR_CELLS) -> Array |
         off = math.hypot(*(at[:2] - pose[:2])) / size
         return off + 10.0 * abs(wrap(float(at[2] - pose[2]))) + 10.0 * abs(float(at[3] - pose[3]))
 
-    found: list[Array] = []
-    for state in sorted(dict.fromkeys(states), key=away):
-        if not lattice.fault(state):
-            found.append(lattice.pose_of(state))
-            if gets_straight(lattice, pose, found[-1]):
-                return found[-1]
-            if len(found) == ASKED:
-                break
-    return found[0] if found else None
+    free = (lattice.pose_of(state) for state in sorted(dict.fromkeys(states), key=away) if not lattice.fault(state))
+    if not gets_straight(lattice, pose, pose):  # where it touches something already, no way is free from there
+        return next(free, None)
+    nearest = list(itertools.islice(free, ASKED))
+    straight = (each for each in nearest if gets_straight(lattice, pose, each))
+    return next(straight, nearest[0] if nearest else None)
 
 
 def gets_straight(lattice: Lattice, pose: Array, end: Array) -> bool:

@@ -119,14 +119,13 @@ class Lattice:
 
         Each costs its base times one more than the largest cost of a cell among its ends and those it crosses.
         """
-        cell, total = divmod(self.number_of(state), self.primitives.bins)[0], 0
-        cost = self.cost.ravel()
-        for number in primitives:
-            move = self.motions.moves[number]
-            crossed = [(0, 0), (move.dx, move.dy), *move.dear]
-            total += move.cost * (1 + max(int(cost[cell + y * self.stride + x]) for x, y in crossed))
-            cell += move.dy * self.stride + move.dx
-        return total
+        cell = self.number_of(state) // self.primitives.bins
+        return self.motions.along.cost(self.cost.ravel(), self.stride, cell, primitives)
+
+    def poses_along(self, state: State, primitives: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Return the poses between primitives (k + 1, 4) and along them (n, 4), headings without jumps."""
+        place = self.grid.centre_of(*state[:2])
+        return self.motions.along.poses_along(place, self.grid.resolution, state[2:], primitives)
 
     def pose_of(self, state: State) -> Array:
         """Return the pose (4,) of a state (column, row, heading, articulation) in `world` [m, m, rad, rad]."""

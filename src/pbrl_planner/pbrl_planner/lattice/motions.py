@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_planner.errors import PlannerError
+from pbrl_planner.lattice.along import Along
 from pbrl_planner.lattice.body import ArticulatedBody
 from pbrl_planner.lattice.moves import Move, MoveTables, Relaxed, moves_of, reach_of, relax
 from pbrl_planner.lattice.primitives import TURN, Pace, PrimitiveSet
@@ -68,6 +69,11 @@ class Motions:
     def relaxed(self) -> Relaxed:
         """What the lower bound is made of."""
         return relax(self.moves, self.primitives.bins, LIMIT)
+
+    @cached_property
+    def along(self) -> Along:
+        """What lies along primitives that follow one another."""
+        return Along.of(self.primitives, self.moves)
 
     @cached_property
     def masks(self) -> list[NDArray[np.bool_]]:

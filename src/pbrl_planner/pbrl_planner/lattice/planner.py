@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_control.planar import Array
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.lattice import search_kernel as kernel
 from pbrl_planner.lattice.lower_bound import LowerBound
@@ -77,9 +76,9 @@ class _Search:
         self._epsilon, self._least = math.inf, 1
         self._bins = lattice.primitives.bins
         self._any: Reached | None = None
-        self._bound = LowerBound(lattice, self._goal, settings.direction)
+        self._bound = LowerBound(lattice, self._goal, settings.direction, towards=self._root)
         self._bound.reach(self._root, FURTHER)
-        self._radius = self._bound.radius
+        self._edge = self._bound.edge
         self._to_bound = self._elapsed()
         self._taken = lattice.motions.shelf.take_records(lattice.cells * self._bins)
         self._records = self._taken.array
@@ -189,7 +188,7 @@ class _Search:
                 lattice.grid.blocked,
                 self._bins,
                 self._bound.toward,
-                self._radius,
+                self._edge,
                 self._bound.turning,
                 self._records,
                 self._heap,
@@ -238,11 +237,13 @@ class _Search:
         entries = int(self._numbers[kernel.HEAP] + self._numbers[kernel.WAITING])
         while len(self._heap) < entries + self._bins:
             self._heap = _grown(self._heap)
+        edge = self._bound.edge
         least = kernel.next_round(
             self._bins,
+            self._lattice.stride,
             self._bound.toward,
-            self._radius,
-            self._bound.radius,
+            self._edge,
+            edge,
             self._bound.turning,
             self._records,
             self._heap,
@@ -250,12 +251,12 @@ class _Search:
             self._numbers,
             numerator,
         )
-        self._radius, self._thin = self._bound.radius, 0
+        self._edge, self._thin = edge, 0
         return int(least)
 
     def _complete(self, numerator: int) -> None:
         """See to it that the lower bound is there on the whole floor: the first plan needs less of it."""
-        if self._radius < kernel.LIMIT:
+        if self._bound.radius < kernel.LIMIT:
             self._bound.finish()
             self._least = max(self._least, min(self._merge(numerator), self._cost_so_far()))
 
@@ -301,7 +302,9 @@ class _Search:
     def _result(self, exhausted: bool, reason: str) -> LatticePlan:
         cost, moves = self._best or (-1, np.zeros(0, dtype=np.int64))
         found = self._best is not None
-        waypoints, poses = self._poses(moves) if found else (np.zeros((0, 4)), np.zeros((0, 4)))
+        waypoints = poses = np.zeros((0, 4))
+        if found:
+            waypoints, poses = self._lattice.poses_along(self._problem.start_state, moves)
         return LatticePlan(
             poses,
             moves,
@@ -317,21 +320,6 @@ class _Search:
             exhausted,
             reason,
         )
-
-    def _poses(self, moves: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Return the poses between primitives (k + 1, 4) and along them (n, 4), headings without jumps."""
-        lattice, here = self._lattice, self._problem.start_state
-        waypoints, parts = [lattice.pose_of(here)], [lattice.pose_of(here)[None]]
-        for number in moves:
-            each = lattice.primitives.primitives[number]
-            centre = np.append(waypoints[-1][:2], [0.0, 0.0])
-            here = (here[0] + each.end[0], here[1] + each.end[1], each.end[2], each.end[3])
-            waypoints.append(lattice.pose_of(here))
-            # Files round: the ends are exact.
-            parts += [(each.poses + centre)[1:-1], waypoints[-1][None]]
-        way, between = np.concatenate(parts), np.array(waypoints)
-        way[:, 2], between[:, 2] = np.unwrap(way[:, 2]), np.unwrap(between[:, 2])
-        return between, way
 
     def _elapsed(self) -> float:
         return time.perf_counter() - self._began
