@@ -206,7 +206,7 @@ class CartRun:
         poses = np.array(poses)
         low, high = self._settings.limits.articulation
         poses[:, 3] = np.clip(poses[:, 3], low, high)
-        plan = CartPlan.timed(poses, self._settings.limits, self._settings.share)
+        plan = CartPlan.timed(poses, self._settings.limits, self._settings.share, self._sent)
         return CartController(plan, body, self._settings, self._sent)
 
     def _note_errors(self, command: CartCommand) -> None:

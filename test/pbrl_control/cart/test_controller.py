@@ -22,7 +22,7 @@ from pbrl_control.cart import (
     DriveStatus,
     compile_kernels,
 )
-from pbrl_control.cart.tracking import feedback
+from pbrl_control.cart.tracking import feedback, room_beside
 
 FLOOR = open_floor()
 
@@ -226,10 +226,36 @@ def test_the_next_plan_takes_over_on_the_way() -> None:
     last = drive(controller, world, FLOOR, 3.0)[-1]
     here = np.array([*world.state])
     path = straight(1.0) + here
-    following = CartController(CartPlan.timed(path, SETTINGS.limits), pr2_body(), SETTINGS, last.sent)
+    plan = CartPlan.timed(path, SETTINGS.limits, SETTINGS.share, last.sent)
+    following = CartController(plan, pr2_body(), SETTINGS, last.sent)
     ticks = drive(following, world, FLOOR, 20.0)
     assert ticks[-1].command.status is DriveStatus.ARRIVED
+    assert max(math.hypot(*tick.command.error[:2]) for tick in ticks) < 0.005
     assert np.abs(ticks[0].sent - last.sent).max() <= SETTINGS.limits.braking * 0.05 + 1e-9
+
+
+@pytest.mark.parametrize("off", [(0.0, 0.019, 0.0, 0.0), (0.0, 0.0, 0.02, 0.0), (-0.015, -0.01, 0.0, 0.0)])
+def test_errors_die_away_at_full_speed_too(off: tuple[float, ...]) -> None:
+    controller, world = made(straight(4.0), noise=np.zeros(4))
+    drive(controller, world, FLOOR, 4.0)
+    world.state = world.state + np.array(off)
+    ticks = drive(controller, world, FLOOR, 3.0)
+    assert np.abs(ticks[-1].command.error).max() < 0.003
+    assert min(tick.command.pace for tick in ticks) > 0.9
+
+
+def test_the_plan_leaves_room_for_what_corrects_errors(rng: np.random.Generator) -> None:
+    speeds = SETTINGS.limits.speeds
+    for _ in range(200):
+        planned, extra = rng.normal(0.0, 0.3, (2, 4))
+        share = room_beside(planned, extra, speeds)
+        assert 0.0 <= share <= 1.0
+        sizes = [
+            np.array([math.hypot(*rates[:2]), *np.abs(rates[2:])])
+            for rates in (extra + share * planned, extra + min(1.0, share + 1e-3) * planned, extra)
+        ]
+        assert (sizes[0] <= speeds + 1e-9).all() or (sizes[2] > speeds).any()
+        assert share == 1.0 or (sizes[1] > speeds).any() or (sizes[2] > speeds).any()
 
 
 def test_arms_that_cannot_follow_hold_the_base_back() -> None:

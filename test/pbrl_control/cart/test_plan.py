@@ -39,6 +39,17 @@ def test_time_is_what_the_slowest_takes() -> None:
     assert CartPlan.timed(turn, LIMITS).duration == pytest.approx(10.0, rel=0.2)
 
 
+@pytest.mark.parametrize("heading", [0.0, 2.1])
+@pytest.mark.parametrize("speed", [0.0, 0.1, 0.3, 5.0])
+def test_who_is_under_way_goes_on_at_his_speed(speed: float, heading: float) -> None:
+    path = straight(3.5, heading)
+    plan = CartPlan.timed(path, LIMITS, 0.5, np.array([speed, 0.1, 0.0, 0.0]))
+    assert plan.rates(0.0, 0.02)[0] == pytest.approx(min(speed, LIMITS.speeds[0]), abs=0.05)
+    assert plan.duration <= CartPlan.timed(path, LIMITS, 0.5).duration + 1e-9
+    backwards = CartPlan.timed(path, LIMITS, 0.5, np.array([-speed, 0.0, 0.0, 0.0]))
+    assert backwards.duration == CartPlan.timed(path, LIMITS, 0.5).duration
+
+
 def test_headings_may_wind_round() -> None:
     turned = np.zeros((9, 4))
     turned[:, 2] = np.angle(np.exp(1j * np.linspace(3.0, 4.0, 9)))

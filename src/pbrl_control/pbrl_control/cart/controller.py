@@ -16,7 +16,7 @@ from pbrl_control.cart.guard import SHARES, Ahead, Guard, Verdict, check_costs
 from pbrl_control.cart.percept import CartCommand, CartPercept, Cause, DriveStatus
 from pbrl_control.cart.plan import CartPlan
 from pbrl_control.cart.settings import CartSettings
-from pbrl_control.cart.tracking import CommandHistory, RateLimits, feedback, to_base, to_world
+from pbrl_control.cart.tracking import REMEMBERED, CommandHistory, RateLimits, feedback, room_beside, to_base, to_world
 from pbrl_control.cart.watch import grip_fault, stale_fault
 from pbrl_control.errors import ControlError
 from pbrl_control.planar import Array, rotation, wrap
@@ -28,7 +28,7 @@ QUICKEST = 4.0  # [1/s] at which the goal's pace grows at most
 CREEPING = 0.05  # pace below which there is no progress
 ROUNDING = 1e-6  # of a pace
 STILL = 0.02  # [m/s, rad/s] standing
-WINDOW = 0.5  # [s] of the plan about the goal in which it is looked for again after a stop
+WINDOW = 0.5  # [s] of the plan about the goal in which it is looked for after a stop, and where a plan is joined
 
 
 class CartController:
@@ -56,7 +56,8 @@ class CartController:
             raise ControlError(f"controller: expected the last command as 4 finite numbers, got {last}")
         self._limits = RateLimits(self.settings.limits)
         self._extra = np.zeros(4)
-        self._time, self._pace, self._arms_share = 0.0, 0.0, 1.0
+        self._joins = bool(np.abs(self._last).max() > STILL)
+        self._time, self._pace, self._arms_share = 0.0, 1.0 if self._joins else 0.0, 1.0
         self._standing = False
         self._now: float | None = None
         self._trouble: float | None = None
@@ -75,6 +76,8 @@ class CartController:
         if not math.isfinite(now):
             raise ControlError(f"controller: expected a finite time, got {now}")
         check_costs(percept.costs)
+        if self._now is None:
+            self._history.add(now - REMEMBERED, self._last)
         dt = self.settings.period if self._now is None else min(max(now - self._now, 0.0), LONGEST_PERIOD)
         self._now = now
         if self._ended:
@@ -97,9 +100,9 @@ class CartController:
 
     def _drive(self, now: float, dt: float, percept: CartPercept, here: Array) -> CartCommand:
         settings, plan = self.settings, self._plan
-        if self._standing:
+        if self._standing or self._joins:
             self._time = plan.nearest(here, self._time - WINDOW, self._time + WINDOW, self._limits.speeds)
-            self._standing = False
+            self._standing = self._joins = False
         goal = plan.at(self._time)
         error = goal - here
         off = math.hypot(error[0], error[1]), float(np.abs(error[2:]).max())
@@ -118,6 +121,8 @@ class CartController:
         towards = min(self._time + pace * step, plan.duration)
         planned = (plan.at(towards) - goal) / step
         extra = feedback(error, self._extra, settings.frequency, step)
+        room = room_beside(planned, extra, speeds)
+        planned, towards = room * planned, self._time + room * (towards - self._time)
         heading = here[2] + 0.5 * self._last[2] * step
         wish = to_base(planned + extra, heading)
         rates, share, verdict = self._free(wish, speeds, dt, here, percept)

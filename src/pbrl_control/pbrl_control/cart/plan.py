@@ -12,7 +12,7 @@ import numpy as np
 from pbrl_control.cart.settings import CartLimits
 from pbrl_control.cart.tracking_kernel import sample
 from pbrl_control.errors import ControlError
-from pbrl_control.planar import Array
+from pbrl_control.planar import Array, rotation
 
 MOST_POSES = 100_000
 STEP = 0.02  # [s at full speed] between samples of a plan that is given its times here
@@ -46,11 +46,24 @@ class CartPlan:
         object.__setattr__(self, "poses", np.ascontiguousarray(poses))
 
     @classmethod
-    def timed(cls, poses: Array | Sequence[Sequence[float]], limits: CartLimits, share: float = 0.5) -> Self:
+    def timed(
+        cls,
+        poses: Array | Sequence[Sequence[float]],
+        limits: CartLimits,
+        share: float = 0.5,
+        last: Array | None = None,
+    ) -> Self:
         """Give times to a planner's poses (n, 4): as soon as can be within speeds and a share of the accelerations.
 
         Between poses everything goes on evenly. Where the plan has a corner, what goes round it is as slow as
         rounding it within 0.16 s at full speed takes.
+
+        Args:
+            poses: as above.
+            limits: of base and articulation.
+            share: of the accelerations.
+            last: (4,) what base and articulation do at the first pose, in the robot's axes, where they are under way
+                [m/s, rad/s]; None: they stand.
 
         Raises:
             ControlError: the poses are not what they should be, or leave the articulation's range.
@@ -73,7 +86,9 @@ class CartPlan:
         samples = np.linspace(0.0, ends[-1], max(int(np.ceil(ends[-1] / STEP)), 1) + 1)
         fine = np.column_stack([np.interp(samples, ends[keep], points[keep, k]) for k in range(4)])
         fine[-1] = points[-1]
-        return cls(_times(samples, fine, share * limits.accelerations), fine)
+        rates = np.zeros(4) if last is None else np.asarray(last, dtype=float)
+        along = np.append(rotation(float(fine[0, 2])) @ rates[:2], rates[2:])
+        return cls(_times(samples, fine, share * limits.accelerations, along), fine)
 
     @property
     def duration(self) -> float:
@@ -121,8 +136,8 @@ def _poses(poses: Array | Sequence[Sequence[float]]) -> Array:
     return points
 
 
-def _times(samples: Array, poses: Array, accelerations: Array) -> Array:
-    """Return when to be at evenly sampled poses, from rest to rest.
+def _times(samples: Array, poses: Array, accelerations: Array, begin: Array) -> Array:
+    """Return when to be at evenly sampled poses, from the rates (4,) that it begins with to rest.
 
     The pace p = d samples / d time is bounded by what corners and starts take of the accelerations, half for each: by
     a pass forwards and one backwards.
@@ -137,7 +152,8 @@ def _times(samples: Array, poses: Array, accelerations: Array) -> Array:
     bend = _three((means[half:] - means[:-half])[: len(poses)]) / (half * step)
     pace = np.minimum(1.0, np.sqrt((0.5 * accelerations / np.maximum(bend, 1e-9)).min(axis=1)))
     push = (0.5 * accelerations / np.maximum(_three(tangent), 1e-9)).min(axis=1)
-    pace[0] = pace[-1] = SLOWEST
+    pace[0] = min(pace[0], float(begin @ tangent[0]) / max(float(tangent[0] @ tangent[0]), 1e-9))
+    pace[-1] = SLOWEST
     pace = np.maximum(pace, SLOWEST)
     for k in range(len(push)):
         pace[k + 1] = min(pace[k + 1], np.sqrt(pace[k] ** 2 + 2.0 * push[k] * step))

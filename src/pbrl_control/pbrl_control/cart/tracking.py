@@ -78,6 +78,24 @@ def feedback(error: Array, extra: Array, frequency: float, dt: float) -> Array:
     return z * z * extra + (1.0 - z) ** 2 / dt * error
 
 
+def room_beside(planned: Array, extra: Array, speeds: Array) -> float:
+    """Return the greatest share of planned rates (4,) that leaves speeds (3,) room for the rates that correct errors.
+
+    At full speed straight on there is none for going sideways: an error would stay for as long as that lasts.
+    """
+    along, across = float(planned[:2] @ planned[:2]), float(planned[:2] @ extra[:2])
+    share = 1.0
+    if along > 0.0:
+        left = float(speeds[0] ** 2 - extra[:2] @ extra[:2])
+        share = (math.sqrt(max(across**2 + along * left, 0.0)) - across) / along if left > 0.0 else 0.0
+    for k in (2, 3):
+        if planned[k] != 0.0:
+            share = min(
+                share, float((speeds[k - 1] - math.copysign(extra[k], extra[k] * planned[k])) / abs(planned[k]))
+            )
+    return min(max(share, 0.0), 1.0)
+
+
 def to_world(rates: Array, heading: float) -> Array:
     """Return rates (4,) whose first two are in the robot's axes with these in those of its parent."""
     c, s = math.cos(heading), math.sin(heading)

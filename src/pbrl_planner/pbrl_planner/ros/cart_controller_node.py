@@ -129,7 +129,7 @@ class CartControllerNode(Node):
             poses = path_from_msg(goal.path)
             low, high = self._settings.limits.articulation
             poses[:, 3] = np.clip(poses[:, 3], low, high)
-            self._plan = CartPlan.timed(poses, self._settings.limits, self._settings.share)
+            self._plan = CartPlan.timed(poses, self._settings.limits, self._settings.share, self._sent)
         except (PlannerError, ControlError) as error:
             self._end(Drove.REFUSED, f"path: {error}")
             return
