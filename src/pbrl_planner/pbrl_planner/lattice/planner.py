@@ -76,7 +76,7 @@ class _Search:
         self._epsilon, self._least = math.inf, 1
         self._bins = lattice.primitives.bins
         self._any: Reached | None = None
-        self._bound = LowerBound(lattice, self._goal, settings.direction, towards=self._root)
+        self._bound = LowerBound(lattice, self._goal, settings.direction)
         self._bound.reach(self._root, FURTHER)
         self._edge = self._bound.edge
         self._to_bound = self._elapsed()
