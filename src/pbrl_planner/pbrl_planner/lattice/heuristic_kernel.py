@@ -1,15 +1,11 @@
-"""Compiled: search over the cells of the floor, from one cell outwards, to be stopped and gone on with.
+"""Compiled: Dijkstra's search over the cells of the floor, from one cell outwards, to be stopped and gone on with.
 
-It is Dijkstra's, or A*'s towards a cell that is asked for: then cells come in the order of their cost plus a bound of
-what is left to there (`left_over`), and fewer that are out of the way are settled before it. Costs, or those sums, fall
-into buckets no wider than the least by which a move makes them greater, so that what is in the first bucket cannot be
-improved any more (Denardo and Fox 1979), in whatever order it is taken out. An entry is a place in a pool; places that
-have become free are used again, so that the pool stays as small as the front of the search.
+Costs fall into buckets no wider than the cheapest move, so that what is in the first bucket cannot be improved any
+more (Denardo and Fox 1979), in whatever order it is taken out. An entry is a place in a pool; places that have become
+free are used again, so that the pool stays as small as the front of the search.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numba import njit
@@ -18,8 +14,6 @@ from numpy.typing import NDArray
 Int = NDArray[np.int32]
 Long = NDArray[np.int64]
 Byte = NDArray[np.uint8]
-Array = NDArray[np.float64]
-Whole = int | np.int64
 
 DONE, REACHED, FULL, TOO_COSTLY = range(4)
 """Why a call returned: all that can be reached is settled, what was asked for is, the pool needs room, a cost came to
@@ -27,31 +21,6 @@ the limit."""
 (BUCKET, WAITING, SPARE, USED) = range(4)
 """Places in `numbers`: the first bucket in which something may wait, entries that wait, the first of the places that
 are free again (-1: none), places used so far, cells settled."""
-RADIUS, LOW, ROW, COLUMN, UNIT = range(5)
-"""Places in `edge`, which tells how far the search has come: what is not settled has at least RADIUS as its sum; what
-is less than LOW is settled; the cell that the search is directed to, and the bound of what is left to there for each
-cell of distance from it, 0 for Dijkstra's search."""
-
-
-@njit(cache=True)
-def left_over(cell: Whole, stride: int, edge: Array) -> int:
-    """Return a lower bound of the cost between a cell and the one that the search is directed to."""
-    if edge[UNIT] == 0.0:
-        return 0
-    row = cell // stride
-    y, x = row - edge[ROW], cell - row * stride - edge[COLUMN]
-    return int(edge[UNIT] * math.sqrt(x * x + y * y))
-
-
-@njit(cache=True)
-def bounded(known: Whole, cell: Whole, stride: int, edge: Array) -> Whole:
-    """Return a lower bound of a cell's cost: the cost itself where it is settled, given what is `known` of it.
-
-    On the edge it is consistent: what is not settled has a sum of at least the radius.
-    """
-    if known < edge[LOW]:
-        return known
-    return min(known, max(int(edge[RADIUS]) - left_over(cell, stride, edge), 0))
 
 
 @njit(cache=True)
@@ -66,8 +35,6 @@ def spread(
     shift: int,
     until: int,
     radius: int,
-    stride: int,
-    edge: Array,
     out: Int,
     head: Int,
     pool: Int,
@@ -83,13 +50,11 @@ def spread(
         cells_first: (m + 1,) where each move's cells begin.
         cells: that it crosses, without source and end, relative to its source.
         limit: as good as infinite; costs have to stay below.
-        shift: a bucket is 2^shift wide, at most the least by which a move makes the sum greater.
+        shift: a bucket is 2^shift wide, at most the least of `base`.
         until: cell that is to be settled; below zero: none.
-        radius: sum up to which all has to be settled.
-        stride: cells of a row of the grid with its border.
-        edge: (5,) what the search is directed to; places above.
-        out: (cells,) least cost so far, `limit` where none is known. What has a sum below 2^shift times the first
-            bucket is settled, the rest has no less than that.
+        radius: cost up to which all has to be settled.
+        out: (cells,) least cost so far, `limit` where none is known. What is below 2^shift times the first bucket is
+            settled, the rest no less than that.
         head: (buckets,) first entry of each, -1 where none is; used in a circle, a power of two that is
             wider than the dearest move.
         pool: (p, 2) each entry's cell, and the next entry of its bucket.
@@ -102,13 +67,12 @@ def spread(
     count, circle = len(step), len(head) - 1
     most = len(pool) - count
     status = DONE
-    left = 0 if until < 0 else left_over(until, stride, edge)
     while waiting > 0:
         place = bucket & circle
         entry = head[place]
         if entry < 0:
             bucket += 1
-            if bucket << shift > radius and (until < 0 or out[until] + left < bucket << shift):
+            if bucket << shift > radius and (until < 0 or out[until] < bucket << shift):
                 status = REACHED
                 break
             continue
@@ -122,7 +86,7 @@ def spread(
         waiting -= 1
         now = np.int64(out[here])
         # It was improved, and taken out, since it was put here.
-        if (now + left_over(here, stride, edge)) >> shift != bucket:
+        if now >> shift != bucket:
             continue
         end_cost = np.int64(cost[here])
         for m in range(count):
@@ -149,7 +113,7 @@ def spread(
             else:
                 entry = used
                 used += 1
-            place = ((total + left_over(source, stride, edge)) >> shift) & circle
+            place = (total >> shift) & circle
             pool[entry, 0], pool[entry, 1] = source, head[place]
             head[place] = entry
             waiting += 1

@@ -78,7 +78,7 @@ class _Search:
         self._any: Reached | None = None
         self._bound = LowerBound(lattice, self._goal, settings.direction)
         self._bound.reach(self._root, FURTHER)
-        self._edge = self._bound.edge
+        self._radius = self._bound.radius
         self._to_bound = self._elapsed()
         self._taken = lattice.motions.shelf.take_records(lattice.cells * self._bins)
         self._records = self._taken.array
@@ -188,7 +188,7 @@ class _Search:
                 lattice.grid.blocked,
                 self._bins,
                 self._bound.toward,
-                self._edge,
+                self._radius,
                 self._bound.turning,
                 self._records,
                 self._heap,
@@ -237,13 +237,11 @@ class _Search:
         entries = int(self._numbers[kernel.HEAP] + self._numbers[kernel.WAITING])
         while len(self._heap) < entries + self._bins:
             self._heap = _grown(self._heap)
-        edge = self._bound.edge
         least = kernel.next_round(
             self._bins,
-            self._lattice.stride,
             self._bound.toward,
-            self._edge,
-            edge,
+            self._radius,
+            self._bound.radius,
             self._bound.turning,
             self._records,
             self._heap,
@@ -251,12 +249,12 @@ class _Search:
             self._numbers,
             numerator,
         )
-        self._edge, self._thin = edge, 0
+        self._radius, self._thin = self._bound.radius, 0
         return int(least)
 
     def _complete(self, numerator: int) -> None:
         """See to it that the lower bound is there on the whole floor: the first plan needs less of it."""
-        if self._bound.radius < kernel.LIMIT:
+        if self._radius < kernel.LIMIT:
             self._bound.finish()
             self._least = max(self._least, min(self._merge(numerator), self._cost_so_far()))
 

@@ -14,13 +14,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_planner.lattice.heap_kernel import heap_pop, heap_push, heapify
-from pbrl_planner.lattice.heuristic_kernel import bounded
 from pbrl_planner.lattice.sweep_kernel import SweepTables, is_free
 
 Long = NDArray[np.int64]
 Int = NDArray[np.int32]
 Byte = NDArray[np.uint8]
-Array = NDArray[np.float64]
 
 LIMIT = 1 << 30
 """Costs end here."""
@@ -53,7 +51,7 @@ def improve(
     blocked: int,
     bins: int,
     toward: Int,
-    edge: Array,
+    radius: int,
     turning: Int,
     records: Long,
     heap: Long,
@@ -80,7 +78,7 @@ def improve(
         blocked: cost from which a cell is not to be entered.
         bins: of heading and articulation together.
         toward: (cells,) lower bound of the cost to the goal's cell; LIMIT: there is no way.
-        edge: (5,) how far that is known, see `heuristic_kernel.bounded`.
+        radius: what is taken for `toward` where that is more.
         turning: (bins,) what is added to it for heading and articulation.
         target: (m,) bin that each move ends in.
         records: (states,) bits 0 to 7: the rank of the move that it was reached by; 8 to 14: the round in which it was
@@ -156,7 +154,7 @@ def improve(
             dearest = max(source, np.int64(cost[end]))
             if dearest >= blocked:
                 continue
-            ahead = bounded(np.int64(toward[end]), end, stride, edge) + np.int64(turning[target[m]])
+            ahead = min(np.int64(toward[end]), np.int64(radius)) + np.int64(turning[target[m]])
             if ahead >= LIMIT:
                 continue
             there = state + step[m]
@@ -202,10 +200,9 @@ def improve(
 @njit(cache=True)
 def next_round(
     bins: int,
-    stride: int,
     toward: Int,
-    before: Array,
-    edge: Array,
+    before: int,
+    radius: int,
     turning: Int,
     records: Long,
     heap: Long,
@@ -213,7 +210,7 @@ def next_round(
     numbers: Long,
     numerator: int,
 ) -> int:
-    """Make one heap of the open and the inconsistent states, for another epsilon, with `edge` instead of `before`.
+    """Make one heap of the open and the inconsistent states, for another epsilon, with `radius` instead of `before`.
 
     Along a cheapest way the first state of that heap has been reached at its least cost, so that the least g + h in it
     is a lower bound of the cheapest plan's cost: it is returned; LIMIT where nothing is left that could improve.
@@ -235,11 +232,10 @@ def next_round(
         if (record >> 8) & 127 == round_:
             continue
         g = LIMIT - ((record >> 16) & COST)
-        cell, turn = state // bins, np.int64(turning[state % bins])
-        floor = np.int64(toward[cell])
-        if entry >> shift != denominator * g + old * (bounded(floor, cell, stride, before) + turn):
+        floor, turn = np.int64(toward[state // bins]), np.int64(turning[state % bins])
+        if entry >> shift != denominator * g + old * (min(floor, np.int64(before)) + turn):
             continue
-        h = bounded(floor, cell, stride, edge) + turn
+        h = min(floor, np.int64(radius)) + turn
         if g + h >= best:
             continue
         heap[count] = ((denominator * g + numerator * h) << shift) | state
@@ -249,8 +245,7 @@ def next_round(
         state = waiting[k]
         records[state] &= ~np.int64(WAITS)
         g = LIMIT - ((records[state] >> 16) & COST)
-        cell = state // bins
-        h = bounded(np.int64(toward[cell]), cell, stride, edge) + np.int64(turning[state % bins])
+        h = min(np.int64(toward[state // bins]), np.int64(radius)) + np.int64(turning[state % bins])
         if g + h >= best:
             continue
         heap[count] = ((denominator * g + numerator * h) << shift) | state
