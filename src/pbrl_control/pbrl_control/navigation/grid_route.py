@@ -16,19 +16,18 @@ from collections.abc import Iterable
 from functools import cache, lru_cache
 from itertools import pairwise
 
-import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from pbrl_control.navigation.grid_kernel import search
+from pbrl_control.navigation.grid_kernel import erode, reaches, search
 from pbrl_control.navigation.motion import MotionChecker
 from pbrl_control.navigation.path import BasePath, Leg
 from pbrl_control.planar import Array, rotation, wrap
 
 Flags = NDArray[np.bool_]
-Cells = NDArray[np.uint8]
+Mask = tuple[NDArray[np.int64], int]
 States = list[tuple[int, int, int]]
 
 CELLS = (0.04, 0.025)
@@ -69,21 +68,22 @@ def _on_grid(grid: _Grid, bare: MotionChecker, start: Array, goal: Array) -> Bas
     ends, end_costs = _exits(grid, bare, goal)
     if not seeds or not ends:
         return None
+    begin, finish = np.array(seeds), np.array(ends)
+    if not reaches(grid.free, grid.turns, grid.moves, begin, finish):
+        return None
     found = search(
         grid.free,
         grid.turns,
         grid.moves,
         grid.angles,
-        np.array(seeds),
+        begin,
         np.array(seed_costs) / grid.size,
-        np.array(ends),
+        finish,
         np.array(end_costs) / grid.size,
         REVERSE,
         TURNING / grid.size,
         CORNER / grid.size,
     )
-    if not len(found):
-        return None
     corners, backwards = _corners(grid, found, start, goal)
     for first, last in itertools.product((True, False), repeat=2):
         # Out of a tight place the robot goes exactly straight; a cell lies a little beside that line.
@@ -145,8 +145,8 @@ class _Grid:
         shapely.prepare(roomy)
         blocked = ~shapely.contains_xy(roomy, x.ravel(), y.ravel()).reshape(rows, columns)
         standing, turning = _masks(checker.footprint.outline.tobytes(), size)
-        self.free = np.stack([_clear(blocked, mask) for mask in standing])
-        self.turns = np.stack([_clear(blocked, mask) for mask in turning])
+        self.free = np.stack([erode(blocked, *mask) for mask in standing])
+        self.turns = np.stack([erode(blocked, *mask) for mask in turning])
 
     def place(self, row: int, column: int) -> Array:
         """Return the point (2,) of a cell in `world` [m]."""
@@ -174,7 +174,7 @@ def _compass() -> tuple[Array, NDArray[np.int64], Array]:
 
 
 @lru_cache(maxsize=8)
-def _masks(corners: bytes, size: float) -> tuple[tuple[Cells, ...], tuple[Cells, ...]]:
+def _masks(corners: bytes, size: float) -> tuple[tuple[Mask, ...], tuple[Mask, ...]]:
     """Return what an outline (k, 2), given as its bytes, covers at each heading, and in the turn to the next."""
     outline = np.frombuffer(corners).reshape(-1, 2)
     headings, _, angles = _compass()
@@ -186,20 +186,16 @@ def _masks(corners: bytes, size: float) -> tuple[tuple[Cells, ...], tuple[Cells,
     return standing, turning
 
 
-def _mask(outline: Array, headings: Iterable[float], size: float) -> Cells:
-    """Return the cells that an outline (k, 2) covers at some headings, the base's in the middle."""
+def _mask(outline: Array, headings: Iterable[float], size: float) -> Mask:
+    """Return the runs of cells that an outline (k, 2) covers at some headings, the base in the middle; see `erode`."""
     placed = [outline @ rotation(float(heading)).T for heading in headings]
     reach = math.ceil(max(float(np.abs(each).max()) for each in placed) / size)
     x, y = np.meshgrid(*(size * np.arange(-reach, reach + 1),) * 2)
     covered = shapely.union_all([Polygon(each) for each in placed])
-    return shapely.intersects_xy(covered, x.ravel(), y.ravel()).reshape(x.shape).astype(np.uint8)
-
-
-def _clear(blocked: Flags, mask: Cells) -> Flags:
-    """Return where none of the cells under a mask is blocked; beyond the grid all are."""
-    reach = mask.shape[0] // 2
-    open_ = np.pad(~blocked, reach).astype(np.uint8)
-    return np.asarray(cv2.erode(open_, mask)[reach:-reach, reach:-reach] > 0, dtype=np.bool_)
+    inside = shapely.intersects_xy(covered, x.ravel(), y.ravel()).reshape(x.shape)
+    edges = np.diff(np.pad(inside, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    row, first = np.nonzero(edges == 1)
+    return np.column_stack((row - reach, first - reach, np.nonzero(edges == -1)[1] - first)), reach
 
 
 def _exits(grid: _Grid, bare: MotionChecker, pose: Array) -> tuple[States, list[float]]:
