@@ -20,6 +20,7 @@ ALLOWED = {
     "bullet_sim": {"pbrl_msgs"},
     "krang_sim": {"pbrl_msgs", "bullet_sim"},
     "pr2_cart_sim": {"pbrl_msgs", "bullet_sim"},
+    "tabletop_sim": {"pbrl_msgs", "bullet_sim"},
 }
 ALLOWED["pbrl_bringup"] = {"pbrl_msgs", *ALLOWED}
 FILES = sorted((ROOT / "src").glob("*/*/**/*.py"))

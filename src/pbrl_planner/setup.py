@@ -21,6 +21,7 @@ setup(
             "lattice_planner_node = pbrl_planner.ros.lattice_planner_node:main",
             "cart_controller_node = pbrl_planner.ros.cart_controller_node:main",
             "cart_navigator_node = pbrl_planner.ros.cart_navigator_node:main",
+            "tabletop_node = pbrl_planner.ros.tabletop_node:main",
         ],
     },
 )

@@ -168,7 +168,8 @@ def _plain(annotation: Any) -> Any:
 
 def _tag(choice: Any) -> str | None:
     if isinstance(choice, type) and issubclass(choice, BaseModel) and "kind" in choice.model_fields:
-        return str(get_args(choice.model_fields["kind"].annotation)[0])
+        kinds = get_args(choice.model_fields["kind"].annotation)
+        return str(kinds[0]) if kinds else None
     return None
 
 

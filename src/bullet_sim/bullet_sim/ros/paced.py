@@ -13,6 +13,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Protocol
 
 from pbrl_msgs.srv import GraspObject, ReleaseObject
@@ -49,6 +50,13 @@ class Session(Protocol):
     def step(self) -> Sequence[Any]:
         """Advance by one physics step; give what is published now."""
 
+    def close(self) -> None:
+        """End it."""
+
+
+class TwoArmed(Session, Protocol):
+    """A run of a robot with two arms and grippers."""
+
     def command_arm(self, side: str, velocity: Sequence[float]) -> None:
         """Ask for the velocities (7,) [rad/s] of an arm's joints."""
 
@@ -58,9 +66,6 @@ class Session(Protocol):
     def release(self, side: str) -> GraspOutcome:
         """Open a gripper."""
 
-    def close(self) -> None:
-        """End it."""
-
 
 class PacedSimulator(Node):
     """Steps a session, publishes what it gives, obeys the command topics.
@@ -69,7 +74,8 @@ class PacedSimulator(Node):
         name: of the node.
         stop: when it is set, `run` returns at its next step.
 
-    A simulator declares its own parameters and `declare_pace`, and then calls `start` with its session.
+    A simulator declares its own parameters and `declare_pace`, and then calls `start` with its session, and `obey_arms`
+    where there are two.
     """
 
     def __init__(self, name: str, stop: threading.Event) -> None:
@@ -91,7 +97,7 @@ class PacedSimulator(Node):
         self._lag: float = declare(self, "command_lag", 0.02, lag, (0.0, 1.0))
 
     def start(self, session: Session, types: dict[str, Callable[[], Any]], latched: Sequence[str] = LATCHED) -> None:
-        """Offer topics and services of a session.
+        """Offer the topics of a session.
 
         Args:
             session: the run.
@@ -102,16 +108,19 @@ class PacedSimulator(Node):
         self._outputs = {
             topic: self.create_publisher(kind, topic, _quality(topic, latched)) for topic, kind in types.items()
         }
+        self._spinner = SingleThreadedExecutor()
+        self._spinner.add_node(self)
+
+    def obey_arms(self, session: TwoArmed) -> None:
+        """Obey the commands of two arms, and offer to grasp and release."""
         for side in ("left", "right"):
             self.listen(
                 Float64MultiArray,
                 f"/{side}_arm_velocity_controller/commands",
                 lambda message, side=side: session.command_arm(side, message.data),
             )
-        self.create_service(GraspObject, "/grasp", self._grasp)
-        self.create_service(ReleaseObject, "/release", self._release)
-        self._spinner = SingleThreadedExecutor()
-        self._spinner.add_node(self)
+        self.create_service(GraspObject, "/grasp", partial(self._grasp, session))
+        self.create_service(ReleaseObject, "/release", partial(self._release, session))
 
     def listen(self, kind: Any, topic: str, command: Callable[[Any], None]) -> None:
         """Obey the messages of a topic; what `command` raises SimError for is warned about and ignored."""
@@ -126,15 +135,19 @@ class PacedSimulator(Node):
         else:
             self._last_command = self._session.time
 
-    def _grasp(self, request: GraspObject.Request, response: GraspObject.Response) -> GraspObject.Response:
+    def _grasp(
+        self, session: TwoArmed, request: GraspObject.Request, response: GraspObject.Response
+    ) -> GraspObject.Response:
         self._heard += 1
-        outcome = self._session.grasp(request.gripper, request.object)
+        outcome = session.grasp(request.gripper, request.object)
         response.success, response.message, response.distance = outcome.success, outcome.message, outcome.distance
         return response
 
-    def _release(self, request: ReleaseObject.Request, response: ReleaseObject.Response) -> ReleaseObject.Response:
+    def _release(
+        self, session: TwoArmed, request: ReleaseObject.Request, response: ReleaseObject.Response
+    ) -> ReleaseObject.Response:
         self._heard += 1
-        outcome = self._session.release(request.gripper)
+        outcome = session.release(request.gripper)
         response.success, response.message = outcome.success, outcome.message
         return response
 

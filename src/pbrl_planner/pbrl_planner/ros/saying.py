@@ -26,10 +26,13 @@ class Saying:
         self._out = node.create_publisher(String, topic, LATCHED)
         self(first)
 
+    def is_new(self, sentence: str) -> bool:
+        """Say whether a sentence differs from the last in more than its numbers: those change all the time."""
+        return NUMBERS.sub("", sentence) != self._said
+
     def __call__(self, sentence: str) -> None:
-        """Say a sentence, if it differs from the last in more than its numbers: those change all the time."""
-        words = NUMBERS.sub("", sentence)
-        if words != self._said:
-            self._said = words
+        """Say a sentence, if it is new."""
+        if self.is_new(sentence):
+            self._said = NUMBERS.sub("", sentence)
             self._out.publish(String(data=sentence))
             self._node.get_logger().info(sentence)

@@ -35,6 +35,7 @@ class SimNode(PacedSimulator):
         scene, seed, gui = self._declare()
         self.session = Pr2Session(scene, seed=seed, gui=gui)
         self.start(self.session, MESSAGE_TYPES, LATCHED)
+        self.obey_arms(self.session)
         self.listen(Twist, "/cmd_vel", self._command_base)
         self.listen(Float64MultiArray, "/torso_velocity_controller/commands", self._command_torso)
         self.listen(Float64MultiArray, "/head_velocity_controller/commands", self._command_head)

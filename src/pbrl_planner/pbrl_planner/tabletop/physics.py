@@ -1,0 +1,85 @@
+"""The world model as a forward model of pushes: friction under each item is learned, displacements follow from it.
+
+Beside `LearnedDisplacements`, which has to see every push of every item several times, this needs a handful of pushes
+an item, and knows then what pushes do that nobody has tried, of other lengths too (`pbrl_model.pushing`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pbrl_control.planar import Array
+from pbrl_model.errors import ModelError
+from pbrl_model.pushing import ObservedPush, PushPosterior, learn_pushes
+from pbrl_planner.errors import PlannerError
+from pbrl_planner.tabletop.desk import Item
+from pbrl_planner.tabletop.displacement import Displacements
+from pbrl_planner.tabletop.primitives import Push
+
+GROWTH = 1.3
+"""Factor by which what was observed of an item has to grow before it is learned from anew: it takes a second."""
+APPROACH = 0.01
+"""[m] between ball and item as a push begins; what comes before the touch changes nothing."""
+
+
+class PhysicsDisplacements:
+    """Displacements by pushes, by way of the friction under each item.
+
+    Args:
+        effector: radius of the ball [m].
+        seed: of the inference.
+        least: pushes of an item below which nothing is predicted.
+    """
+
+    def __init__(self, effector: float, *, seed: int, least: int = 3) -> None:
+        self._effector, self._seed, self._least = effector, seed, least
+        self._observed: dict[str, list[tuple[Push, Array]]] = {}
+        self._known: dict[str, tuple[int, PushPosterior]] = {}
+
+    def count(self, name: str) -> int:
+        """Return how many pushes of an item were observed."""
+        return len(self._observed.get(name, ()))
+
+    def update(self, name: str, push: Push, displacement: Array) -> None:
+        """Take in what a push did to an item (3,) in its frame before.
+
+        Raises:
+            PlannerError: it is not finite.
+        """
+        value = np.asarray(displacement, dtype=float)
+        if value.shape != (3,) or not np.isfinite(value).all():
+            raise PlannerError(f"displacement: expected a finite (dx, dy, dtheta), got {displacement}")
+        self._observed.setdefault(name, []).append((push, value))
+
+    def posterior(self, item: Item) -> PushPosterior:
+        """Return what is known of an item's friction, learned anew where enough was observed since.
+
+        Raises:
+            PlannerError: there were too few pushes, or they cannot be learned from.
+        """
+        seen = self._observed.get(item.name, [])
+        if len(seen) < self._least:
+            raise PlannerError(
+                f"model of {item.name!r}: expected at least {self._least} pushes, got {len(seen)}; push it more often"
+            )
+        count, known = self._known.get(item.name, (0, None))
+        if known is None or len(seen) >= GROWTH * count:
+            pushes = [ObservedPush(push.path(item, self._effector, APPROACH), moved) for push, moved in seen]
+            try:
+                known = learn_pushes(np.random.default_rng(self._seed), item.half, self._effector, pushes)
+            except ModelError as error:
+                raise PlannerError(f"model of {item.name!r}: {error}") from error
+            self._known[item.name] = (len(seen), known)
+        return known
+
+    def displacements(self, item: Item, pushes: Sequence[Push]) -> Displacements:
+        """See `ForwardModel`.
+
+        Raises:
+            PlannerError: there were too few pushes of this item.
+        """
+        paths = [push.path(item, self._effector, APPROACH) for push in pushes]
+        mean, spread = self.posterior(item).predict(paths)
+        return Displacements(tuple(pushes), mean, spread)

@@ -1,0 +1,110 @@
+"""A desk is tidied over DDS: the simulator as a user starts it, the node, and somebody who asks for it."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from geometry_msgs.msg import Point
+from pbrl_msgs.action import Tidy
+from pbrl_msgs.msg import Body, Scene
+from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
+
+from pbrl_bringup.graph import node_environment
+from pbrl_bringup.paths import node_executable
+from pbrl_control.ros.qos import LATCHED
+from pbrl_planner.errors import PlannerError
+from pbrl_planner.ros.desk_hearing import desk_from_msg
+from pbrl_planner.ros.tabletop_node import TabletopNode, objective_of
+from pbrl_planner.tabletop import Desk, Item, Table
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tabletop"))
+
+from desk_cases import model_of
+
+ERASER = {"kind": "eraser", "pose": [0.1, 0.05, 0.4]}
+TEXT = "terms:\n  - {term: near, items: [eraser], point: [-0.05, 0.05]}\n"
+
+
+@pytest.fixture
+def known(tmp_path: Path) -> Path:
+    """What pushes do to an eraser."""
+    path = tmp_path / "model.json"
+    path.write_text(json.dumps(model_of(Desk(Table.of(0.8, 0.5), (Item("eraser", 0.13, 0.05),))).as_dict()))
+    return path
+
+
+@pytest.fixture
+def simulator(tmp_path: Path, stage: Any) -> Iterator[subprocess.Popen]:
+    """An eraser on a table, seen with noise, as fast as can be."""
+    path = tmp_path / "one.yaml"
+    path.write_text(yaml.safe_dump({"items": {"eraser": ERASER}, "vision": {"source": "noise", "rate": 10.0}}))
+    words = ["--ros-args", "-p", f"scene:={path}", "-p", "rate:=3.0"]
+    domain = stage.node.context.get_domain_id()
+    process = subprocess.Popen([str(node_executable("tabletop_sim", "sim_node")), *words], env=node_environment(domain))
+    yield process
+    process.terminate()
+    process.wait(timeout=20.0)
+
+
+def test_an_eraser_is_pushed_to_where_it_is_wanted(stage: Any, simulator: subprocess.Popen, known: Path) -> None:
+    node = stage.add(TabletopNode, camera="", model=str(known), think=0.3)
+    said, drawn = stage.hear(String, "/tabletop/status", LATCHED), stage.hear(MarkerArray, "/markers")
+    stage.until(lambda: not node._hearing.missing())
+    told: list[Tidy.Feedback] = []
+    results = stage.ask(Tidy, "/tidy", Tidy.Goal(objective=TEXT, enough=0.03, seed=1), told.append)
+    stage.until(lambda: results)
+    assert results[0].success, results[0].message
+    assert results[0].cost <= 0.03
+    assert results[0].pushes >= 2
+    stage.until(lambda: any("the objective is reached" in each.data for each in said))
+    assert told
+    assert drawn
+    assert simulator.poll() is None
+
+
+def test_goals_that_make_no_sense_are_refused_in_words(stage: Any, simulator: subprocess.Popen, known: Path) -> None:
+    node = stage.add(TabletopNode, camera="", model=str(known))
+    early = stage.ask(Tidy, "/tidy", Tidy.Goal(objective="straighten", enough=math.nan))
+    stage.until(lambda: early)
+    if early[0].message.startswith("expected to have heard"):
+        assert not early[0].success
+    stage.until(lambda: not node._hearing.missing())
+    for objective, words in (
+        ("nowhere", "expected a file, YAML text, or one of"),
+        ("straighten", "expected one of the items eraser, got 'remote'"),
+        ("terms: [{term: near, items: [eraser], weight: .inf}]", "weight"),
+    ):
+        results = stage.ask(Tidy, "/tidy", Tidy.Goal(objective=objective, enough=math.nan))
+        stage.until(lambda results=results: results)
+        assert not results[0].success
+        assert words in results[0].message
+
+
+def test_a_file_that_is_no_model_is_refused(stage: Any, tmp_path: Path) -> None:
+    path = tmp_path / "bad.json"
+    path.write_text("[1, 2]")
+    with pytest.raises(PlannerError, match="expected a JSON file of displacement models"):
+        stage.add(TabletopNode, model=str(path))
+
+
+def test_scenes_that_are_no_desks_are_refused() -> None:
+    ring = (0.0, 0.0, 0.1, 0.8)
+    with pytest.raises(PlannerError, match="a table with 4 corners"):
+        desk_from_msg(Scene(), ring)
+    corners = Scene()
+    for x, y in ((-0.4, -0.25), (0.4, -0.25), (0.4, 0.25), (-0.4, 0.25)):
+        corners.room.append(Point(x=x, y=y))
+    corners.bodies.append(Body(name="blob", footprint=[Point()] * 4, movable=True, height=0.02))
+    with pytest.raises(PlannerError, match="blob"):
+        desk_from_msg(corners, ring)
+    with pytest.raises(PlannerError, match="expected a file"):
+        objective_of(Desk(Table.of(1, 1), (Item("eraser", 0.13, 0.05),)), "no such thing")
