@@ -118,10 +118,11 @@ def test_rows_count_what_they_say() -> None:
     assert not clean_rows(runs[1:] + runs[-1:], 0.3)[0].holds
     touched = [Executed(outcome(0.02), [], 0.0)] * 18 + [Executed(outcome(0.02), [], 0.01)] * 2
     assert [row.holds for row in obstacle_rows(touched, 0.05)][:2] == [False, False]
-    searched = Searched(0.8, 0.3, 30.0, 1.0, 200, 0.5, 0.2, math.inf, 0.1, 30)
+    searched = Searched(0.8, 0.3, 0.1, 0.2, 1.0, 0.5, (math.inf, 2.0, 1.0), math.inf, 0.1, 30)
     held = planning_rows([searched] * 3, [searched] * 3, Thesis(1399, 18.0, 33.0, 2.0))
     assert [row.holds for row in held] == [True, True, True, False]
-    assert held[1].value == pytest.approx(30.0)
+    assert held[1].value == pytest.approx(0.1)
+    assert held[2].value == pytest.approx(30.0), "one that does not get there counts with the time it had"
     compared = Compared(
         "a", "+x", 0.05, (0.05, 0, 0), (0.05, 0.001, 0.01), (True, True, False), (0.05, 0, 0.01), (0.05, 0.002, 0.01)
     )

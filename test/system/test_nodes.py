@@ -16,6 +16,7 @@ NODES = [
     ("krang_sim", "sim_node"),
     ("krang_sim", "hand_node"),
     ("pr2_cart_sim", "sim_node"),
+    ("tabletop_sim", "sim_node"),
     ("pbrl_bag", "recorder_node"),
     ("pbrl_bag", "player_node"),
     ("pbrl_control", "body_controller_node"),
@@ -27,6 +28,7 @@ NODES = [
     ("pbrl_planner", "lattice_planner_node"),
     ("pbrl_planner", "cart_controller_node"),
     ("pbrl_planner", "cart_navigator_node"),
+    ("pbrl_planner", "tabletop_node"),
     ("pbrl_namo", "namo_node"),
 ]
 
@@ -67,6 +69,9 @@ def test_every_package_is_in_the_index(package: str) -> None:
     [
         ("krang_sim", "sim_node", 'scene:="locked_castor"', "locked_caster"),
         ("krang_sim", "hand_node", 'scene:="locked_castor"', "locked_caster"),
+        ("tabletop_sim", "sim_node", 'scene:="dekc"', "desk"),
+        ("tabletop_sim", "sim_node", 'vision:="blurred"', "rendered or noise"),
+        ("pbrl_planner", "tabletop_node", "think:=0.0", "0.05 to 600"),
         ("pbrl_control", "push_node", 'plan:="turn_tabel"', "turn_table"),
         ("pbrl_model", "model_node", 'priors:="nowhere.yaml"', "nowhere.yaml"),
         ("pbrl_mismatch", "mismatch_node", "without:=['carpet']", "carpet"),

@@ -77,14 +77,16 @@ def draw_run(desk: Desk, layouts: Sequence[Array], pictures: Pictures, outcome: 
 def draw_costs(starts: Sequence[Mapping[str, Any]], best: float, thesis: float, out: Path) -> None:
     """Draw times and costs of searches from all starts into `figure.png`."""
     figure, (left, right) = canvas(2, width=10.0, height=4.2)
-    names = ("seconds_without", "seconds_with", "seconds_ours")
-    labels = ("without\ndescent", "with", "and\nby pushes")
-    values = [[each[name] for each in starts if np.isfinite(each[name])] for name in names]
-    left.boxplot(values, tick_labels=labels, showfliers=True)
+    labels = ("without\ndescent", "with", "ours")
+    values = [[each["nearly"][k] for each in starts] for k in range(3)]
+    left.boxplot([[each for each in column if np.isfinite(each)] for column in values], tick_labels=labels)
+    for k, column in enumerate(values):
+        missed = sum(not np.isfinite(each) for each in column)
+        left.annotate(f"{missed} not" if missed else "", (k + 1, 1.0), xycoords=("data", "axes fraction"), ha="center")
     left.axhline(thesis, color="#c2185b", ls="--", lw=1.0)
     left.text(0.6, thesis, "the thesis, with descent", color="#c2185b", va="bottom", fontsize=8)
     left.set_yscale("log")
-    left.set_ylabel("time to the same objective [s]")
+    left.set_ylabel("time until the table is nearly laid [s]")
     costs = [[each[name] for each in starts] for name in ("first", "without", "with_descent", "cost")]
     right.boxplot(costs, tick_labels=("start", "without\ndescent", "with", "ours,\nin the end"))
     right.axhline(best, color="#5aa469", ls="--", lw=1.0)

@@ -9,8 +9,8 @@ from tabletop_sim.session import DeskSession
 
 Image = NDArray[np.uint8]
 
-EYE, TARGET = (0.0, -0.75, 0.85), (0.0, 0.0, 0.0)
-"""Where it stands and what it looks at [m]."""
+EYE, TARGET = (0.22, 0.72, 0.62), (0.0, -0.06, 0.0)
+"""Where it stands, across the table from the arm, and what it looks at [m]."""
 SIZE = (640, 400)
 
 
