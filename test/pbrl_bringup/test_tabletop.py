@@ -55,6 +55,26 @@ def test_the_camera_sees_what_is_there_and_which_way_round() -> None:
             assert max(abs(wrap(a - b)) for a, b in zip(seen[:, 2], truth[:, 2], strict=True)) < math.radians(2.0)
 
 
+def test_items_that_touch_each_other_or_an_obstacle_are_told_apart() -> None:
+    with DeskRun(desk_scene("obstacle", "rendered"), seed=1) as run:
+        beside = np.array([[0.04 + 0.0255, 0.0, math.pi / 2]])  # flat against the hole punch
+        run.place(beside)
+        run.session.follow(np.tile(run.session.arm.joint_state()[0], (5, 1)), 0.01)
+        seen = run.look()
+        assert "eraser" in seen
+        np.testing.assert_allclose(seen["eraser"][:2], run.truth()[0, :2], atol=0.004)
+    with DeskRun(desk_scene("desk", "rendered"), seed=1) as run:
+        layout = np.array([[-0.25, 0.1, 0.3], [0.2, 0.1, 0.0], [0.0, -0.05, 0.0]])
+        run.place(layout)
+        run.look()
+        layout[0] = [0.0, 0.0555, 0.0]  # the eraser is pushed up to the scale
+        run.session.world.place("eraser", layout[0])
+        run.session.follow(np.tile(run.session.arm.joint_state()[0], (5, 1)), 0.01)
+        seen = run.look()
+        assert set(seen) == {"eraser", "remote", "scale"}
+        np.testing.assert_allclose(seen["eraser"][:2], run.truth()[0, :2], atol=0.005)
+
+
 def test_an_eraser_is_taught_and_then_put_in_its_place() -> None:
     with DeskRun(one(), seed=1) as run:
         settings = LessonSettings(least=3, most=3)

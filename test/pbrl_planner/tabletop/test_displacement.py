@@ -35,6 +35,24 @@ def test_intervals_hold_the_next_push_as_often_as_they_say(count: int, rng: np.r
     assert abs(np.mean(inside) - 0.95) < 0.015
 
 
+def test_pushes_that_were_by_luck_alike_are_not_taken_for_certain(rng: np.random.Generator) -> None:
+    inside = []
+    for _ in range(300):
+        model, truth = LearnedDisplacements(), {}
+        for push in pushes_of((0.05, 0.015)):
+            truth[push] = rng.normal([0.05, 0.0, 0.0], 0.01), 0.001 * rng.chisquare(3, 3)
+            for _ in range(4):
+                model.update("eraser", push, rng.normal(*truth[push]))
+        push = min(truth, key=lambda each: model.of("eraser", each).variance.sum())
+        low, high = model.interval("eraser", push)
+        plain = model.of("eraser", push).interval()
+        following = rng.normal(*truth[push])
+        inside.append([(low <= following) & (following <= high), (plain[0] <= following) & (following <= plain[1])])
+    moderated, plain_share = np.mean(inside, axis=(0, 2))
+    assert moderated > 0.9
+    assert plain_share < moderated, "the push that seems surest is where luck shows"
+
+
 def test_displacements_are_in_the_items_frame(rng: np.random.Generator) -> None:
     for _ in range(50):
         pose, by = rng.uniform(-3, 3, 3), rng.uniform(-1, 1, 3)

@@ -24,7 +24,9 @@ def draw(model: LearnedDisplacements, names: Sequence[str], out: Path) -> None:
         for number, name in enumerate(names):
             known = [model.of(name, Push(primitive, TRAVEL)) for primitive in PRIMITIVES]
             mean = scale * np.array([each.mean[axis] for each in known])
-            half = scale * np.array([np.ptp(each.interval()[:, axis]) / 2.0 for each in known])
+            half = scale * np.array(
+                [np.ptp(model.interval(name, Push(primitive, TRAVEL))[:, axis]) / 2.0 for primitive in PRIMITIVES]
+            )
             at = np.arange(len(PRIMITIVES)) + (number - (len(names) - 1) / 2.0) * wide
             axes.bar(at, mean, wide, color=COLOURS[number], label=name)
             axes.errorbar(at, mean, half, fmt="none", ecolor="#333", elinewidth=1.0, capsize=2.0)

@@ -144,7 +144,7 @@ def rows_of(found: Sequence[Compared], taught: int) -> list[Row]:
 def _compared(seen: Seen, model: LearnedDisplacements, number: int, physics: tuple[Array, Array]) -> Compared:
     name, push, moved = seen
     known = model.of(name, push)
-    low, high = known.interval(SHARE)
+    low, high = model.interval(name, push, SHARE)
     inside = (low <= moved) & (moved <= high)
     return Compared(
         name,

@@ -46,7 +46,9 @@ class DeskRun:
         self._strokes = Strokes(self._arm)
         self.desk = known_desk(scene, self._arm.reach(self._strokes.settings.low))
         heights = {name: item.height for name, item in scene.items.items()}
-        self._finder = ItemFinder(self.desk.table, [TallItem(item, heights[item.name]) for item in self.desk.items])
+        tall = [TallItem(item, heights[item.name]) for item in self.desk.items]
+        obstacles = [(TallItem(item, heights[item.name]), pose) for item, pose in self.desk.obstacles]
+        self._finder = ItemFinder(self.desk.table, tall, obstacles)
         self._seen: dict[str, Array] = {}
         self.pushes = 0
 

@@ -156,7 +156,9 @@ class DeskHearing:
         if self._finder is None:
             desk = self.desk()
             heights = {body.name: body.height for body in self._scene.bodies}
-            self._finder = ItemFinder(desk.table, [TallItem(item, heights[item.name]) for item in desk.items])
+            tall = [TallItem(item, heights[item.name]) for item in desk.items]
+            obstacles = [(TallItem(item, heights[item.name]), pose) for item, pose in desk.obstacles]
+            self._finder = ItemFinder(desk.table, tall, obstacles)
         sight = self._finder.find(grey_image(message), camera, self._seen)
         self._seen.update(sight.poses)
         return sight.poses

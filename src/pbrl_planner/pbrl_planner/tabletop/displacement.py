@@ -18,6 +18,8 @@ from pbrl_planner.errors import PlannerError
 from pbrl_planner.tabletop.desk import Item
 from pbrl_planner.tabletop.primitives import Push
 
+PRIOR_COUNT = 4
+"""Pushes that what is known of all others' spread counts for, beside those of one kind."""
 LEAST = 3
 """Pushes from which a spread can be told at all with some use."""
 
@@ -106,15 +108,24 @@ class PushStatistics:
         """Standard deviation of the next displacement (3,), the mean's doubt in it."""
         return np.asarray(np.sqrt(self.variance * (1.0 + 1.0 / max(self.count, 1))))
 
-    def interval(self, share: float = 0.95) -> Array:
+    def interval(self, share: float = 0.95, prior: Array | None = None) -> Array:
         """Return the range (2, 3) in which the next displacement lies with a probability: Student's t.
+
+        Args:
+            share: the probability.
+            prior: (3,) variance that such pushes have as a rule; it counts as `PRIOR_COUNT` pushes, so that few which
+                were by luck all alike are not taken for certain (Smyth 2004). None: there is none.
 
         Raises:
             PlannerError: there were fewer than two pushes, or the share is no probability.
         """
         if not 0.0 < share < 1.0 or self.count < 2:
             raise PlannerError(f"interval: expected a share in (0, 1) and two pushes, got {share} and {self.count}")
-        half = stats.t.ppf(0.5 + share / 2.0, self.count - 1) * self.spread
+        freedom, variance = self.count - 1, self.variance
+        if prior is not None:
+            variance = (PRIOR_COUNT * prior + freedom * variance) / (PRIOR_COUNT + freedom)
+            freedom += PRIOR_COUNT
+        half = stats.t.ppf(0.5 + share / 2.0, freedom) * np.sqrt(variance * (1.0 + 1.0 / self.count))
         return np.array([self.mean - half, self.mean + half])
 
 
@@ -134,6 +145,15 @@ class LearnedDisplacements:
     def of(self, name: str, push: Push) -> PushStatistics:
         """Return what is known of one push of one item; empty statistics where nothing is."""
         return self._statistics.setdefault((name, push), PushStatistics())
+
+    def interval(self, name: str, push: Push, share: float = 0.95) -> Array:
+        """Return the range (2, 3) in which the next displacement by a push lies with a probability.
+
+        Raises:
+            PlannerError: the push was made fewer than twice, or the share is no probability.
+        """
+        known = [each.variance for _, _, each in self.known() if each.count >= 2]
+        return self.of(name, push).interval(share, np.mean(known, axis=0) if known else None)
 
     def update(self, name: str, push: Push, displacement: Array) -> None:
         """Take in what a push did to an item (3,)."""

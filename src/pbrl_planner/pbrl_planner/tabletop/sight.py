@@ -34,6 +34,8 @@ OBLONG = 1.15
 """Sides of a box from which the seen area itself has a clear direction."""
 LABELLED = 15.0
 """Grey levels by which the end with the label is lighter."""
+WHOLE = 0.97
+"""Share of an item's picture that has to be dark where it is taken to lie as it lay."""
 ROUNDS = 4
 SQUARE = math.pi / 2.0
 
@@ -79,10 +81,13 @@ class ItemFinder:
     Args:
         table: outside which nothing is looked for.
         items: that there are.
+        obstacles: that are known, and where each is (3,): what is dark there is looked through.
     """
 
-    def __init__(self, table: Table, items: Sequence[TallItem]) -> None:
-        self.table, self.items = table, tuple(items)
+    def __init__(
+        self, table: Table, items: Sequence[TallItem], obstacles: Sequence[tuple[TallItem, Array]] = ()
+    ) -> None:
+        self.table, self.items, self.obstacles = table, tuple(items), tuple(obstacles)
 
     def find(self, image: Image, camera: CameraCalibration, before: Mapping[str, Array] | None = None) -> Sight:
         """Find the items in a picture.
@@ -92,8 +97,25 @@ class ItemFinder:
             camera: that took it.
             before: where items were, (3,) by name; it decides between items alike and which way round they lie.
         """
-        known = before or {}
-        blobs = self._blobs(image, camera)
+        known, dark = before or {}, self._dark(image, camera)
+        poses, strange = self._matched(image, dark, camera, known)
+        # Where items touch, two are one blob: one that lies where it lay is taken out of it, then the other is seen.
+        for tall in self.items:
+            name = tall.item.name
+            if name not in poses and name in known and _is_there(dark, known[name], tall, camera):
+                rest = dark.copy()
+                _cut_out(rest, known[name], tall, camera)
+                again, left = self._matched(image, rest, camera, known)
+                if len(again) >= len(poses):
+                    poses, strange, dark = {**again, name: known[name]}, left, rest
+        missing = tuple(tall.item.name for tall in self.items if tall.item.name not in poses)
+        return Sight(poses, missing, tuple(strange))
+
+    def _matched(
+        self, image: Image, dark: Image, camera: CameraCalibration, known: Mapping[str, Array]
+    ) -> tuple[dict[str, Array], list[Array]]:
+        """Return the poses of items that blobs are taken for, and the middles of other blobs."""
+        blobs = self._blobs(dark, camera)
         costs = np.array([[self._unlike(blob, camera, tall, known) for tall in self.items] for blob in blobs])
         poses: dict[str, Array] = {}
         taken = set()
@@ -103,20 +125,24 @@ class ItemFinder:
                 tall = self.items[column]
                 poses[tall.item.name] = _pose(image, blobs[row], camera, tall, known.get(tall.item.name))
                 taken.add(int(row))
-        missing = tuple(tall.item.name for tall in self.items if tall.item.name not in poses)
-        strange = [_on_plane(blob, camera, 0.0).mean(axis=0) for k, blob in enumerate(blobs) if k not in taken]
-        return Sight(poses, missing, tuple(strange))
+        return poses, [_on_plane(blob, camera, 0.0).mean(axis=0) for k, blob in enumerate(blobs) if k not in taken]
 
-    def _blobs(self, image: Image, camera: CameraCalibration) -> list[Array]:
-        """Return the outlines (k, 2) [px] of what is dark on the table."""
+    def _dark(self, image: Image, camera: CameraCalibration) -> Image:
+        """Return where the table is dark, and no obstacle is known to be."""
         low, high = self.table.low, self.table.high
         corners = np.array([[low[0], low[1], 0.0], [high[0], low[1], 0.0], [*high, 0.0], [low[0], high[1], 0.0]])
         top = np.zeros(image.shape, np.uint8)
         cv2.fillConvexPoly(top, np.rint(camera.project(corners)).astype(np.int32), (1,))
         if not top.any():
-            return []
+            return top
         bright = float(np.percentile(image[top > 0], 90))
         dark = ((image < DARK * bright) & (top > 0)).astype(np.uint8)
+        for tall, pose in self.obstacles:
+            _cut_out(dark, pose, tall, camera)
+        return dark
+
+    def _blobs(self, dark: Image, camera: CameraCalibration) -> list[Array]:
+        """Return the outlines (k, 2) [px] of what is dark."""
         dark = np.asarray(cv2.morphologyEx(dark, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)))
         found, _ = cv2.findContours(dark, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         outlines = [np.asarray(each[:, 0], dtype=float) for each in found if len(each) >= 4]
@@ -177,6 +203,24 @@ def _silhouette(pose: Array, tall: TallItem, camera: CameraCalibration) -> Array
     corners = placed(tall.item.half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]), pose)
     points = np.vstack([np.column_stack((corners, np.full(4, z))) for z in (0.0, tall.height)])
     return np.asarray(cv2.convexHull(camera.project(points).astype(np.float32))[:, 0], dtype=float)
+
+
+def _is_there(dark: Image, pose: Array, tall: TallItem, camera: CameraCalibration) -> bool:
+    """Say whether all that would be dark with an item at a pose (3,) is."""
+    seen = _painted(dark.shape, pose, tall, camera)
+    return bool(seen.any()) and float(dark[seen > 0].mean()) >= WHOLE
+
+
+def _cut_out(dark: Image, pose: Array, tall: TallItem, camera: CameraCalibration) -> None:
+    """Make bright what would be dark with an item at a pose (3,), and a pixel around it."""
+    dark[cv2.dilate(_painted(dark.shape, pose, tall, camera), np.ones((3, 3), np.uint8)) > 0] = 0
+
+
+def _painted(shape: tuple[int, ...], pose: Array, tall: TallItem, camera: CameraCalibration) -> Image:
+    """Return a picture in which an item at a pose (3,) is 1."""
+    picture = np.zeros(shape, np.uint8)
+    cv2.fillConvexPoly(picture, np.rint(_silhouette(pose, tall, camera)).astype(np.int32), (1,))
+    return picture
 
 
 def _shape(outline: Array) -> tuple[Array, float, float]:
