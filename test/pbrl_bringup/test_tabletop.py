@@ -13,11 +13,12 @@ from pbrl_bringup.experiments.displacement_models import Compared
 from pbrl_bringup.experiments.displacement_models import rows_of as model_rows
 from pbrl_bringup.experiments.tabletop_clean import rows_of as clean_rows
 from pbrl_bringup.experiments.tabletop_executed import Executed
+from pbrl_bringup.experiments.tabletop_models import rows_of as compared_rows
 from pbrl_bringup.experiments.tabletop_obstacle import rows_of as obstacle_rows
 from pbrl_bringup.experiments.tabletop_planning import Searched, Thesis
 from pbrl_bringup.experiments.tabletop_planning import rows_of as planning_rows
 from pbrl_bringup.tabletop.desk_run import DeskRun, random_layout
-from pbrl_bringup.tabletop.models import best_known, desk_scene, objective_file
+from pbrl_bringup.tabletop.models import best_known, desk_scene, objective_file, taught
 from pbrl_bringup.tabletop.pictures import Pictures
 from pbrl_bringup.tabletop.teaching import teach
 from pbrl_bringup.tabletop.tidy import Outcome, tidied
@@ -108,6 +109,16 @@ def test_an_eraser_is_taught_and_then_put_in_its_place() -> None:
         assert [number for number, _ in strip] == sorted({number for number, _ in strip})
 
 
+@pytest.mark.parametrize(("forward", "most"), [("tables", 130), ("physics", 8)])
+def test_what_was_taught_makes_a_model_in_another_process(forward: str, most: int) -> None:
+    found = taught(one(), 1, forward)
+    assert 6 <= found.pushes <= most
+    model = found.model(0.012, 1)
+    with DeskRun(one(), seed=1) as run:
+        told = model.displacements(run.desk.items[0], pushes_of((0.05,)))
+    assert told.mean[0, 0] > 0.02 > -0.02 > told.mean[1, 0]
+
+
 def test_an_item_that_is_gone_ends_teaching_in_words() -> None:
     with DeskRun(one(), seed=1) as run:
         run.session.world.place("eraser", np.array([9.0, 0.0, 0.0]))
@@ -131,13 +142,19 @@ def outcome(cost: float, replans: int = 2) -> Outcome:
 
 def test_rows_count_what_they_say() -> None:
     straight = [[0.01, 0.0, 0.0], [-0.01, 0.0, math.pi / 2], [0.0, 0.0, math.pi]]
-    runs = [Executed(outcome(0.2), straight, 0.0)] * 18 + [Executed(outcome(0.9, 9), [[0.3, 0.0, 0.4]] * 3, 0.0)] * 2
+    runs = [Executed(outcome(0.2), straight, 0.0, 150)] * 18 + [
+        Executed(outcome(0.9, 9), [[0.3, 0.0, 0.4]] * 3, 0.0, 150)
+    ] * 2
     rows = clean_rows(runs, 0.3)
     assert (rows[0].value, rows[0].holds) == (18.0, True)
     assert (rows[1].value, rows[2].value) == (2.0, 18.0)
     assert not clean_rows(runs[1:] + runs[-1:], 0.3)[0].holds
-    touched = [Executed(outcome(0.02), [], 0.0)] * 18 + [Executed(outcome(0.02), [], 0.01)] * 2
+    touched = [Executed(outcome(0.02), [], 0.0, 50)] * 18 + [Executed(outcome(0.02), [], 0.01, 50)] * 2
     assert [row.holds for row in obstacle_rows(touched, 0.05)][:2] == [False, False]
+    few = [Executed(outcome(0.2), straight, 0.0, 18)] * 7 + [Executed(outcome(0.9, 9), straight, 0.0, 18)]
+    both = compared_rows(runs[:8], few, 0.3)
+    assert [row.holds for row in both] == [False, True, True, True]
+    assert both[1].value == pytest.approx(150 / 18)
     searched = Searched(0.8, 0.3, 0.1, 0.2, 1.0, 0.5, (math.inf, 2.0, 1.0), math.inf, 0.1, 30)
     held = planning_rows([searched] * 3, [searched] * 3, Thesis(1399, 18.0, 33.0, 2.0))
     assert [row.holds for row in held] == [True, True, True, False]

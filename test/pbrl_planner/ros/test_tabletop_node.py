@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -69,6 +70,31 @@ def test_an_eraser_is_pushed_to_where_it_is_wanted(stage: Any, simulator: subpro
     assert told
     assert drawn
     assert simulator.poll() is None
+
+
+def test_a_robot_that_falls_silent_in_a_push_ends_it_in_words(
+    stage: Any, simulator: subprocess.Popen, known: Path
+) -> None:
+    node = stage.add(TabletopNode, camera="", model=str(known), think=0.3)
+    stage.until(lambda: not node._hearing.missing())
+    told: list[Tidy.Feedback] = []
+    results = stage.ask(Tidy, "/tidy", Tidy.Goal(objective=TEXT, enough=0.03, seed=1), told.append)
+    stage.until(lambda: any(each.pushes == 1 for each in told))
+    simulator.send_signal(signal.SIGSTOP)
+    stage.time = node._now()
+    try:
+        while not results:  # somebody else's clock goes on
+            stage.time += 0.1
+            stage.tell_time()
+            stage.executor.spin_once(timeout_sec=0.02)
+            assert stage.time < node._hearing.heard + 120.0
+    finally:
+        simulator.send_signal(signal.SIGCONT)
+    assert not results[0].success
+    assert "nothing on /joint_states" in results[0].message
+    again = stage.ask(Tidy, "/tidy", Tidy.Goal(objective=TEXT, enough=0.03, seed=1))
+    stage.until(lambda: again)
+    assert again[0].success, again[0].message
 
 
 def test_goals_that_make_no_sense_are_refused_in_words(stage: Any, simulator: subprocess.Popen, known: Path) -> None:

@@ -120,6 +120,46 @@ def test_what_the_arm_does_not_reach_ends_it_in_words() -> None:
     assert "from its column" in stage.executive.ended.reason
 
 
+def test_a_camera_that_is_silent_ends_it_and_one_that_hesitates_does_not() -> None:
+    stage = Stage(Two())
+    stage.executive.begin(stage.task, 0.0, stage.joints)
+    while stage.executive.ended is None:
+        stage.now += DT
+        angles = stage.executive.tick(stage.now, stage.joints)
+        stage.joints = stage.joints if angles is None else angles
+        assert stage.now < 60.0
+    assert stage.executive.ended.ending is Ending.BLIND
+    assert stage.executive.state is State.IDLE
+    slow = Stage(Two())
+    slow.executive.begin(slow.task, 0.0, slow.joints)
+    last = 0.0
+    while slow.executive.ended is None:
+        slow.now += DT
+        angles = slow.executive.tick(slow.now, slow.joints)
+        slow.joints = slow.joints if angles is None else angles
+        if slow.now > last + 4.0:
+            last = slow.now
+            slow.executive.see(slow.now, slow.poses, 3)
+        if slow.executive.question is not None:
+            slow.executive.answer(slow.task.next(slow.executive.question), slow.now, slow.joints)
+    assert slow.executive.ended.ending is Ending.TIDY
+
+
+def test_halted_in_mid_push_nothing_is_moved_any_more() -> None:
+    stage = Stage(Two())
+    stage.executive.begin(stage.task, 0.0, stage.joints)
+    while stage.executive.state is not State.PUSHING:
+        stage.step()
+    stage.executive.halt(Ended(Ending.SILENT, "not heard"))
+    assert stage.executive.tick(stage.now + DT, stage.joints) is None
+    assert stage.executive.ended is not None
+    assert stage.executive.ended.ending is Ending.SILENT
+    stage.executive.halt(Ended(Ending.BLIND, "nor seen"))
+    assert stage.executive.ended.ending is Ending.SILENT, "a task ends once"
+    stage.run(120.0)
+    assert stage.executive.ended.ending is Ending.TIDY, "the next one begins where the arm is"
+
+
 def test_an_answer_that_comes_too_late_does_nothing() -> None:
     stage = Stage(Two())
     stage.executive.answer(NextPush(0, Push("+x"), np.zeros((2, 2))), 0.0, stage.joints)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from desk_cases import layout_of, model_of, three
@@ -116,3 +118,15 @@ def test_lessons_are_learned_without_leaving_the_table(rng: np.random.Generator)
         found = lessons.model.displacements(item, pushes_of((0.05,)))
         known = truth.displacements(item, pushes_of((0.05,)))
         assert np.abs(found.mean - known.mean).max() < 0.05
+
+
+def test_not_told_what_is_enough_it_is_near_the_best_that_can_be(rng: np.random.Generator) -> None:
+    desk = three()
+    task = tidying(desk, model_of(desk), enough=math.nan)
+    layout = layout_of(desk, rng)
+    task.next(seen(desk, layout))
+    assert math.isfinite(task.enough)
+    assert task.enough < task.cost
+    again = tidying(desk, model_of(desk), enough=math.nan)
+    again.next(seen(desk, layout))
+    assert again.enough == task.enough

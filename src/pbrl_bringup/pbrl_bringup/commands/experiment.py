@@ -26,6 +26,7 @@ EXPERIMENTS = {
     "displacement-models": "figure 2: what six pushes do to three items, learned, and compared with 200 more pushes",
     "tabletop-3": "figures 6 and 9: two plates and a platter are laid, with the descent of the objective and without",
     "tabletop-6": "figures 7 and 9: four plates and two platters are laid",
+    "tabletop-models": "a desk is cleaned with tables of displacements, and with the world model after few pushes",
     "tabletop-obstacle": "figures 8 and 9: an eraser goes round a hole punch that must not be touched",
     "tabletop-clean": "figures 5 and 9: an arm straightens what lies on a desk",
     "contact": "section 6.5.3: a wheel found on a table that is only pushed by another",

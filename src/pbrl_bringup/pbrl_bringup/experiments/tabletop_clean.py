@@ -28,13 +28,17 @@ THESIS_REPLANS, THESIS_SECONDS = 4, 820.0
 
 def measure(seed: int, quick: bool, out: Path) -> Measured:
     """Clean the desk from 20 random starts."""
+    best, limit = desk_limit(seed)
+    found = executed("desk", "straighten", seed, out, QUICK_STARTS if quick else STARTS, limit)
+    return Measured(rows_of(found, limit), {**details_of(found), "best": best, "limit": limit})
+
+
+def desk_limit(seed: int) -> tuple[float, float]:
+    """Return the cost of the best layout known, and the cost at which the desk counts as clean."""
     with DeskRun(desk_scene("desk", "noise"), seed=seed) as run:
         objective = Objective.from_file(run.desk, objective_file("straighten"))
         best = best_known(objective, random_layouts(run.desk, seed + 1, DESCENTS))[1]
-    count = len(objective.desk.items)
-    limit = best + count * (NEAR + ALIGNED_WEIGHT * OFF)
-    found = executed("desk", "straighten", seed, out, QUICK_STARTS if quick else STARTS, limit)
-    return Measured(rows_of(found, limit), {**details_of(found), "best": best, "limit": limit})
+    return best, best + len(objective.desk.items) * (NEAR + ALIGNED_WEIGHT * OFF)
 
 
 def rows_of(found: list[Executed], limit: float) -> list[Row]:

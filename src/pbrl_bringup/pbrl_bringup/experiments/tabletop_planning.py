@@ -19,7 +19,7 @@ from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.experiments.tabletop_figure import draw_costs, draw_run
 from pbrl_bringup.parallel import in_parallel
 from pbrl_bringup.tabletop.desk_run import DeskRun, random_layout
-from pbrl_bringup.tabletop.models import best_known, desk_scene, objective_file, random_layouts, taught_model
+from pbrl_bringup.tabletop.models import best_known, desk_scene, objective_file, random_layouts, taught
 from pbrl_bringup.tabletop.pictures import Pictures
 from pbrl_bringup.tabletop.tidy import tidied
 from pbrl_planner.tabletop import (
@@ -66,7 +66,7 @@ class Thesis:
 
 @dataclass(frozen=True)
 class Searched:
-    """What became of one start. Times are infinite where it was not reached within `PATIENCE`.
+    """What became of one start. Times are infinite where it was not reached within `PATIENCE`, NaN where not asked for.
 
     Attributes:
         first: cost at the start.
@@ -76,7 +76,7 @@ class Searched:
         seconds_with: time of a search with the descent until it was as good as `without` [s].
         seconds_ours: the same of ours.
         nearly: times until `NEARLY` of the gap is closed: without the descent, with it, ours [s].
-        laid: time until ours had closed `CLOSED` of the gap [s]; infinite, too, where that was not asked for.
+        laid: time until ours had closed `CLOSED` of the gap [s].
         cost: of ours in the end.
         steps: pushes of its plan.
     """
@@ -106,15 +106,17 @@ def measured(name: str, seed: int, out: Path, thesis: Thesis, starts: int, laid:
         shown: run one in the simulator, for the film strip.
     """
     scene = desk_scene(name, "noise")
-    model, _ = taught_model(scene, seed)
+    told = taught(scene, seed).data
     with DeskRun(scene, seed=seed) as run:
         desk = run.desk
     objective = Objective.from_file(desk, objective_file(name))
     best = best_known(objective, random_layouts(desk, seed + 1, DESCENTS))[1]
-    told = model.as_dict()
-    jobs = [(desk, name, told, seed, number, thesis.nodes, best, number < laid) for number in range(max(starts, laid))]
+    jobs = [
+        (desk, name, told, seed, number, thesis.nodes if number < starts else 0, best, number < laid)
+        for number in range(max(starts, laid))
+    ]
     found = in_parallel(trial, jobs, "starts")
-    draw_costs([asdict(each) for each in found], best, thesis.seconds, out)
+    draw_costs([asdict(each) for each in found[:starts]], best, thesis.seconds, out)
     rows = rows_of(found[:starts], found[:laid], thesis)
     details: dict[str, Any] = {"starts": [asdict(each) for each in found], "best": best}
     if shown:
@@ -140,7 +142,7 @@ def trial(
         told: the model.
         seed: of the starts.
         number: of this one.
-        nodes: layouts that the search without the descent gets.
+        nodes: layouts that the search without the descent gets; 0: searches are not compared, only ours is made.
         best: cost that is known to be possible.
         lay: whether ours goes on until the table is laid.
     """
@@ -152,27 +154,21 @@ def trial(
 
     for settings in (PLAIN, OURS):  # what is compiled, or loaded, is no part of a search
         search(settings.model_copy(update={"nodes": WARM})).improve(PATIENCE)
-    plain, same = (search(each.model_copy(update={"nodes": nodes})) for each in (PLAIN, WITH_DESCENT))
-    plain.improve(PATIENCE)
-    same.improve(PATIENCE)
-    level, first = plain.best_cost, plain.first_cost
-    searches = [search(each) for each in (PLAIN, WITH_DESCENT, OURS)]
-    as_good = [_until(each, level) for each in searches[1:]]
-    nearly = [_until(each, first - NEARLY * (first - best)) for each in searches]
-    ours = searches[-1]
-    laid = _until(ours, first - CLOSED * (first - best)) if lay else np.inf
-    return Searched(
-        first,
-        level,
-        plain.seconds,
-        same.best_cost,
-        as_good[0],
-        as_good[1],
-        (nearly[0], nearly[1], nearly[2]),
-        laid,
-        ours.best_cost,
-        len(ours.plan().steps),
-    )
+    ours = search(OURS)
+    first = ours.first_cost
+    level, seconds, same, as_good, nearly = np.nan, np.nan, np.nan, (np.nan, np.nan), (np.nan,) * 3
+    if nodes:
+        plain, descending = (search(each.model_copy(update={"nodes": nodes})) for each in (PLAIN, WITH_DESCENT))
+        plain.improve(PATIENCE)
+        descending.improve(PATIENCE)
+        level, seconds, same = plain.best_cost, plain.seconds, descending.best_cost
+        searches = [search(PLAIN), search(WITH_DESCENT), ours]
+        as_good = _until(searches[1], level), _until(ours, level)
+        target = first - NEARLY * (first - best)
+        nearly = _until(searches[0], target), _until(searches[1], target), _until(ours, target)
+    laid = _until(ours, first - CLOSED * (first - best)) if lay else np.nan
+    steps = len(ours.plan().steps)
+    return Searched(first, level, seconds, same, *as_good, nearly, laid, ours.best_cost, steps)
 
 
 def _until(search: TabletopPlanner, cost: float) -> float:

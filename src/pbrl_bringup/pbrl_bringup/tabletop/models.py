@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,8 +13,9 @@ from pbrl_bringup.tabletop.desk_run import DeskRun, random_layout
 from pbrl_bringup.tabletop.teaching import Seen, teach
 from pbrl_bringup.terminal import progress
 from pbrl_control.planar import Array
-from pbrl_planner.tabletop import Desk, LearnedDisplacements, Objective, pushes_of
+from pbrl_planner.tabletop import Desk, ForwardModel, LearnedDisplacements, Objective, PhysicsDisplacements, pushes_of
 from pbrl_planner.tabletop.descent import descend
+from pbrl_planner.tabletop.knowledge import ONCE, TOLD_BY
 from tabletop_sim.catalogue import DeskItem
 from tabletop_sim.scene import DeskScene, Vision, desk_folder, load_desk
 
@@ -20,6 +23,27 @@ TRAVELS = (0.05, 0.015)
 """Of the ball in a push [m]: the thesis's, and a short one to set things right."""
 MARGIN, ORIENTATION = 0.004, 0.4
 """Of the descents that look for the best layout, as `TabletopSettings` has them [m], [m/rad]."""
+
+
+@dataclass(frozen=True)
+class Taught:
+    """A forward model as plain data.
+
+    Attributes:
+        forward: which, of `FORWARD_MODELS`.
+        data: as its `as_dict` gives it.
+        pushes: that taught it.
+    """
+
+    forward: str
+    data: Mapping[str, Any]
+    pushes: int
+
+    def model(self, effector: float, seed: int) -> ForwardModel:
+        """Return the model, for a ball of a radius [m]."""
+        if self.forward == "physics":
+            return PhysicsDisplacements.from_dict(self.data, effector, seed=seed)
+        return LearnedDisplacements.from_dict(self.data)
 
 
 def desk_scene(name: str, vision: Vision) -> DeskScene:
@@ -33,26 +57,30 @@ def objective_file(name: str) -> Path:
     return desk_folder().parent / "objectives" / f"{name}.yaml"
 
 
-def taught_model(
-    scene: DeskScene, seed: int, travels: tuple[float, ...] = TRAVELS
-) -> tuple[LearnedDisplacements, list[Seen]]:
+def taught(scene: DeskScene, seed: int, forward: str = "tables") -> Taught:
     """Teach the items of a desk, one of each kind: what is learned of one plate holds for all.
 
     Args:
         scene: the desk.
         seed: of the simulator.
-        travels: of the pushes [m].
-
-    Returns:
-        A model of all items, and what was seen.
+        forward: which forward model; the world model is taught one push of each primitive.
     """
     first = {_make(item): name for name, item in reversed(list(scene.items.items())) if not item.obstacle}
     alone = scene.model_copy(update={"items": {name: scene.items[name] for name in first.values()}})
+    physics = forward == "physics"
     with DeskRun(alone, seed=seed) as run, progress("pushes that teach") as bar:
-        model, seen = teach(run, pushes_of(travels), told=bar)
-    told = model.as_dict()
+        model, seen = teach(run, pushes_of((TOLD_BY,) if physics else TRAVELS), ONCE if physics else None, told=bar)
+        told: Mapping[str, Any] = _observed(seen, run.desk.effector, seed) if physics else model.as_dict()
     whole = {name: told[first[_make(item)]] for name, item in scene.items.items() if not item.obstacle}
-    return LearnedDisplacements.from_dict(whole), seen
+    return Taught(forward, whole, len(seen))
+
+
+def _observed(seen: Sequence[Seen], effector: float, seed: int) -> Mapping[str, Any]:
+    """Return what was seen as the world model keeps it."""
+    physics = PhysicsDisplacements(effector, seed=seed)
+    for name, push, moved in seen:
+        physics.update(name, push, moved)
+    return physics.as_dict()
 
 
 def best_known(objective: Objective, layouts: Sequence[Array]) -> tuple[Array, float]:

@@ -49,11 +49,13 @@ class DeskHearing:
 
     Attributes:
         joints: (4,) where the arm is [rad]; None: not heard yet.
+        heard: when that was, by the node's clock [s].
     """
 
     def __init__(self, node: Node, camera: str, look: Look) -> None:
         self._node, self._camera, self._look = node, camera, look
         self.joints: Array | None = None
+        self.heard = -math.inf
         self._description: str | None = None
         self._scene: Scene | None = None
         self._places: dict[str, Transform] = {}
@@ -135,6 +137,7 @@ class DeskHearing:
         table = dict(zip(message.name, message.position, strict=False))
         if all(name in table for name in JOINTS):
             self.joints = np.array([table[name] for name in JOINTS])
+            self.heard = self._node.get_clock().now().nanoseconds * 1e-9
 
     def _on_info(self, message: CameraInfo) -> None:
         self._info = message

@@ -8,14 +8,12 @@ plan.
 
 from __future__ import annotations
 
-import json
 import math
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from pbrl_msgs.action import Tidy
 from rclpy.node import Node
@@ -32,12 +30,12 @@ from pbrl_planner.ros.one_goal import OneGoal
 from pbrl_planner.ros.running import run_node
 from pbrl_planner.ros.saying import Saying
 from pbrl_planner.tabletop import (
+    FORWARD_MODELS,
     Desk,
     DeskExecutive,
     Ended,
     Ending,
-    LearnedDisplacements,
-    Lessons,
+    Knowledge,
     NextPush,
     Objective,
     State,
@@ -46,12 +44,12 @@ from pbrl_planner.tabletop import (
     Teaching,
     Tidying,
     TidyingSettings,
-    pushes_of,
 )
-from pbrl_planner.tabletop.descent import near_best
 
 TICK = 0.01
 """[s] of the node's clock."""
+SILENT = 2.0
+"""Without the arm's joints for so long [s] nothing is moved any more."""
 OUTPUT = "/ball_arm_position_controller/commands"
 
 
@@ -76,12 +74,12 @@ class TabletopNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("tabletop_node", **options)
         camera = declare(self, "camera", "overhead_0", "overhead camera; empty: poses on /ar_tags/<item>/pose")
+        kind = declare(self, "forward_model", "tables", f"what pushes do is known as: {' or '.join(FORWARD_MODELS)}")
         model = declare(self, "model", "", "JSON of what pushes do; read at the start, written when it was learned")
         self._think = declare(self, "think", 2.0, "seconds for a plan", (0.05, 600.0))
         refuse_unknown(self)
-        self._file = Path(model) if model else None
-        self._model = self._load()
         self._planning = TabletopSettings()
+        self._known = Knowledge(kind, self._planning.travels, file=Path(model) if model else None)
         self._goal: _Goal | None = None
         self._thought: Future[NextPush | Ended] | None = None
         self._thinker = ThreadPoolExecutor(1)
@@ -122,7 +120,8 @@ class TabletopNode(Node):
             return
         self._goal = _Goal(objective, float(request.enough), int(request.seed))
         self._thought = None
-        task: Task = self._lessons(desk) if request.teach or not self._is_taught(desk) else self._tidying(self._goal)
+        learn = request.teach or not self._known.is_taught(desk)
+        task: Task = self._known.lessons(desk) if learn else self._tidying(self._goal)
         assert self._hearing.joints is not None
         self._executive.begin(task, self._now(), self._hearing.joints)
 
@@ -135,23 +134,9 @@ class TabletopNode(Node):
         if self._executive is not None and self._hearing.joints is not None:
             self._executive.cancel(self._now(), self._hearing.joints)
 
-    def _lessons(self, desk: Desk) -> Teaching:
-        return Teaching(Lessons(desk, pushes_of(self._planning.travels)))
-
-    def _is_taught(self, desk: Desk) -> bool:
-        try:
-            for item in desk.items:
-                self._model.displacements(item, pushes_of(self._planning.travels))
-        except PlannerError:
-            return False
-        return True
-
     def _tidying(self, goal: _Goal) -> Tidying:
-        if math.isnan(goal.enough):
-            rng = np.random.default_rng(goal.seed)
-            goal.enough = near_best(goal.objective, rng, self._planning.margin, self._planning.orientation)
         settings = TidyingSettings(enough=goal.enough, think=self._think)
-        return Tidying(goal.objective, self._model, seed=goal.seed + 1, settings=settings, planning=self._planning)
+        return Tidying(goal.objective, self._known.model, seed=goal.seed, settings=settings, planning=self._planning)
 
     # What is due
 
@@ -164,6 +149,8 @@ class TabletopNode(Node):
         if executive is None or joints is None:
             return
         now = self._now()
+        if executive.task is not None and now > self._hearing.heard + SILENT:
+            executive.halt(Ended(Ending.SILENT, f"nothing on /joint_states for {SILENT:.0f} s; is the robot running?"))
         self._think_or_answer(executive, now, joints)
         angles = executive.tick(now, joints)
         if angles is not None:
@@ -191,11 +178,13 @@ class TabletopNode(Node):
             return
         ended, done = executive.ended, executive.last_task
         if isinstance(done, Teaching) and ended.ending is Ending.TAUGHT:
-            self._model, goal.taught = done.lessons.model, goal.taught + done.pushes
-            self._save()
+            goal.taught += done.pushes
+            self._known.take_in(done)
+            self._keep()
             executive.begin(self._tidying(goal), now, joints)
             return
         self._goal = None
+        self._keep()
         result = Tidy.Result(
             success=ended.ending.success, message=f"{ended.ending.value}: {ended.reason}", cost=math.nan
         )
@@ -203,6 +192,13 @@ class TabletopNode(Node):
             result.cost, result.pushes, result.replans = done.cost, done.pushes, max(done.replans, 0)
         self._say(result.message)
         self._goals.end(result, result.success)
+
+    def _keep(self) -> None:
+        """Write down what is known of pushes; each that was made has added to it."""
+        try:
+            self._known.write()
+        except PlannerError as error:
+            self.get_logger().error(str(error))
 
     def _tell(self, state: State, task: Task, goal: _Goal) -> None:
         feedback = Tidy.Feedback(state=state.value, pushes=goal.taught + task.pushes, cost=math.nan)
@@ -220,23 +216,6 @@ class TabletopNode(Node):
             self._goals.tell(feedback)
 
     # Small things
-
-    def _load(self) -> LearnedDisplacements:
-        if self._file is None or not self._file.exists():
-            return LearnedDisplacements()
-        try:
-            return LearnedDisplacements.from_dict(json.loads(self._file.read_text(encoding="utf-8")))
-        except (OSError, ValueError, AttributeError, TypeError) as error:
-            raise PlannerError(
-                f"model: expected a JSON file of displacement models, got {self._file}: {error}"
-            ) from error
-
-    def _save(self) -> None:
-        if self._file is not None:
-            try:
-                self._file.write_text(json.dumps(self._model.as_dict(), indent=1) + "\n", encoding="utf-8")
-            except OSError as error:
-                self.get_logger().error(f"model: expected to write {self._file}, got {error}")
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9

@@ -3,6 +3,7 @@
 from pbrl_planner.tabletop.desk import Desk, Item, Table
 from pbrl_planner.tabletop.displacement import Displacements, ForwardModel, LearnedDisplacements, PushStatistics
 from pbrl_planner.tabletop.executive import DeskExecutive, State
+from pbrl_planner.tabletop.knowledge import FORWARD_MODELS, Knowledge
 from pbrl_planner.tabletop.lessons import Lessons, LessonSettings, Teaching
 from pbrl_planner.tabletop.objective import Aligned, Apart, Facing, Near, Objective
 from pbrl_planner.tabletop.physics import PhysicsDisplacements
@@ -15,6 +16,7 @@ from pbrl_planner.tabletop.task import Ended, Ending, NextPush, Task
 from pbrl_planner.tabletop.tidying import Tidying, TidyingSettings
 
 __all__ = [
+    "FORWARD_MODELS",
     "PRIMITIVES",
     "Aligned",
     "Apart",
@@ -27,6 +29,7 @@ __all__ = [
     "ForwardModel",
     "Item",
     "ItemFinder",
+    "Knowledge",
     "LearnedDisplacements",
     "LessonSettings",
     "Lessons",

@@ -18,6 +18,8 @@ SETTLE = 0.2
 """[s] between the end of a motion and the first picture that counts."""
 LOOKS = 3
 """Pictures in which an item may be missing before it counts as lost: people reach across tables."""
+BLIND = 5.0
+"""Without a look for so long [s] the camera is not there any more."""
 
 
 class State(Enum):
@@ -50,7 +52,7 @@ class DeskExecutive:
         self.question: Mapping[str, Array] | None = None
         self.last_task: Task | None = None
         self._stroke: Stroke | None = None
-        self._begun = self._clear = 0.0
+        self._begun = self._clear = self._looked = 0.0
         self._misses = 0
 
     @property
@@ -75,6 +77,12 @@ class DeskExecutive:
             self.ended, self.question = Ended(Ending.CANCELLED, "cancelled"), None
             self._stow(now, joints)
 
+    def halt(self, ended: Ended) -> None:
+        """End the task under way, if any, and leave the arm where it is."""
+        self._stroke, self.question, self.state = None, None, State.IDLE
+        if self.task is not None:
+            self.ended = ended
+
     def tick(self, now: float, joints: Array) -> Array | None:
         """Return the angles (4,) that the arm is to have now; None: it stays where it is.
 
@@ -82,6 +90,8 @@ class DeskExecutive:
             now: time [s].
             joints: (4,) where the arm is [rad].
         """
+        if self.state is State.LOOKING and now > self._looked + BLIND:
+            self.halt(Ended(Ending.BLIND, f"no picture of it for {BLIND:.0f} s; is the camera running?"))
         if self._stroke is None:
             return None
         index = int((now - self._begun) / self._stroke.period)
@@ -93,7 +103,7 @@ class DeskExecutive:
             self._stow(now, last)
         elif self.state is State.STOWING:
             self.state = State.LOOKING if self.task is not None else State.IDLE
-            self._clear = now + SETTLE
+            self._clear = self._looked = now + SETTLE
         return last
 
     def see(self, stamp: float, poses: Mapping[str, Array], wanted: int) -> None:
@@ -106,6 +116,7 @@ class DeskExecutive:
         """
         if self.state is not State.LOOKING or stamp < self._clear:
             return
+        self._looked = stamp
         if len(poses) < wanted and self._misses < LOOKS:
             self._misses += 1
             return

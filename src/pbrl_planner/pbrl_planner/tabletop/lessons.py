@@ -38,8 +38,8 @@ class LessonSettings(Section):
 
     position_error: Positive = 0.002
     yaw_error: Positive = 0.03
-    least: Annotated[int, Field(ge=2, le=1000)] = 4
-    most: Annotated[int, Field(ge=2, le=1000)] = 10
+    least: Annotated[int, Field(ge=1, le=1000)] = 4
+    most: Annotated[int, Field(ge=1, le=1000)] = 10
     room: Positive = 0.02
 
 

@@ -6,7 +6,7 @@ an item, and knows then what pushes do that nobody has tried, of other lengths t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -34,7 +34,8 @@ class PhysicsDisplacements:
     """
 
     def __init__(self, effector: float, *, seed: int, least: int = 3) -> None:
-        self._effector, self._seed, self._least = effector, seed, least
+        self.least = least
+        self._effector, self._seed = effector, seed
         self._observed: dict[str, list[tuple[Push, Array]]] = {}
         self._known: dict[str, tuple[int, PushPosterior]] = {}
 
@@ -60,9 +61,9 @@ class PhysicsDisplacements:
             PlannerError: there were too few pushes, or they cannot be learned from.
         """
         seen = self._observed.get(item.name, [])
-        if len(seen) < self._least:
+        if len(seen) < self.least:
             raise PlannerError(
-                f"model of {item.name!r}: expected at least {self._least} pushes, got {len(seen)}; push it more often"
+                f"model of {item.name!r}: expected at least {self.least} pushes, got {len(seen)}; push it more often"
             )
         count, known = self._known.get(item.name, (0, None))
         if known is None or len(seen) >= GROWTH * count:
@@ -83,3 +84,34 @@ class PhysicsDisplacements:
         paths = [push.path(item, self._effector, APPROACH) for push in pushes]
         mean, spread = self.posterior(item).predict(paths)
         return Displacements(tuple(pushes), mean, spread)
+
+    def as_dict(self) -> dict[str, list[dict[str, object]]]:
+        """Return what was observed as plain data for a file: by item, a list of pushes with what they did."""
+        return {
+            name: [
+                {"primitive": push.primitive, "travel": push.travel, "displacement": moved.tolist()}
+                for push, moved in seen
+            ]
+            for name, seen in self._observed.items()
+        }
+
+    @classmethod
+    def from_dict(
+        cls, data: Mapping[str, Sequence[Mapping[str, object]]], effector: float, *, seed: int
+    ) -> PhysicsDisplacements:
+        """Return a model from what `as_dict` gave.
+
+        Raises:
+            PlannerError: a key is missing or a value makes no sense.
+        """
+        model = cls(effector, seed=seed)
+        for name, rows in data.items():
+            for row in rows:
+                try:
+                    push = Push(str(row["primitive"]), float(str(row["travel"])))
+                    model.update(name, push, np.array(row["displacement"], dtype=float))
+                except (KeyError, TypeError, ValueError) as error:
+                    raise PlannerError(
+                        f"model of {name!r}: expected primitive, travel and displacement, got {dict(row)}: {error}"
+                    ) from error
+        return model

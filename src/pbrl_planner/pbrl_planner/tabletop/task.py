@@ -20,6 +20,8 @@ class Ending(Enum):
     TAUGHT = "what pushes do is known"
     CRAMPED = "what is left to be learned has no room"
     LOST = "an item is not seen"
+    BLIND = "the table is not seen"
+    SILENT = "the arm is not heard"
     BLOCKED = "an item is where it cannot be: on another, or over the border"
     UNREACHED = "the arm does not reach a push"
     CANCELLED = "it is not wanted any more"

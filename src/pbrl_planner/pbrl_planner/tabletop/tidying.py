@@ -5,12 +5,14 @@ Pure: a layout goes in, what to do next comes out. No clock but the planner's, n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from pbrl_control.planar import Array
 from pbrl_control.settings import Positive, Section
+from pbrl_planner.tabletop.descent import near_best
 from pbrl_planner.tabletop.desk import Desk
 from pbrl_planner.tabletop.displacement import ForwardModel
 from pbrl_planner.tabletop.objective import Objective
@@ -29,7 +31,8 @@ class TidyingSettings(Section):
     """When it is tidy enough, and how much may be spent.
 
     Attributes:
-        enough: cost at which the objective counts as reached.
+        enough: cost at which the objective counts as reached; NaN: one that is near the best that layouts can have
+            (`descent.near_best`), which the first look waits for.
         slack: cost by which a plan is to be better than enough, and by which the rest of it may come out worse than
             enough, before it is planned anew.
         think: [s] for the first plan, and for each that follows.
@@ -37,7 +40,7 @@ class TidyingSettings(Section):
         stubborn: times that a plan may bring nothing, in a row, before it is given up.
     """
 
-    enough: float
+    enough: float = math.nan
     slack: Positive = 0.03
     think: Positive = 2.0
     pushes: int = 400
@@ -60,6 +63,7 @@ class Tidying:
         plan: the last one.
         planning_seconds: of all searches.
         cost: of the layout that was seen last.
+        enough: cost at which the objective counts as reached.
     """
 
     def __init__(
@@ -75,6 +79,7 @@ class Tidying:
         self.planning = planning or TabletopSettings()
         self.kinds = pushes_of(self.planning.travels)
         self.replans, self.pushes, self.planning_seconds, self.cost = -1, 0, 0.0, np.inf
+        self.enough = self.settings.enough
         self.plan: TabletopPlan | None = None
         self._seed, self._left, self._idle = seed, np.empty(0, dtype=np.int64), 0
         self._made: tuple[int, Push, Array] | None = None
@@ -98,15 +103,18 @@ class Tidying:
         fault = self.desk.fault(layout, -self.planning.touching)
         if fault:
             return Ended(Ending.BLOCKED, f"{fault}; move it a little by hand")
+        if math.isnan(self.enough):
+            rng = np.random.default_rng(self._seed)
+            self.enough = near_best(self.objective, rng, self.planning.margin, self.planning.orientation)
         self.cost = self.objective(layout)
-        if self.cost <= self.settings.enough:
-            return Ended(Ending.TIDY, f"cost {self.cost:.3f}, {self.settings.enough:.3f} is enough")
+        if self.cost <= self.enough:
+            return Ended(Ending.TIDY, f"cost {self.cost:.3f}, {self.enough:.3f} is enough")
         if self.pushes >= self.settings.pushes:
             return Ended(Ending.SPENT, f"cost {self.cost:.3f} after {self.pushes} pushes")
         if not self._still_good(layout):
             self._replan(layout)
         if not len(self._left):
-            return Ended(Ending.BEST, f"cost {self.cost:.3f}, {self.settings.enough:.3f} was wanted")
+            return Ended(Ending.BEST, f"cost {self.cost:.3f}, {self.enough:.3f} was wanted")
         item, kind = divmod(int(self._left[0]), len(self.kinds))
         self._left = self._left[1:]
         self.pushes += 1
@@ -132,9 +140,8 @@ class Tidying:
         end = np.empty_like(layout)
         if not follow(layout, self._left, np.ones(len(self._left), dtype=np.uint8), tables, end):
             return False
-        return (
-            self.objective(end) <= max(self.plan.cost + self.settings.slack, self.settings.enough) + self.settings.slack
-        )
+        slack = self.settings.slack
+        return self.objective(end) <= max(self.plan.cost + slack, self.enough) + slack
 
     def _replan(self, layout: Array) -> None:
         self.replans += 1
@@ -143,7 +150,7 @@ class Tidying:
         for _ in range(settings.stubborn):
             self._seed += 1
             search = TabletopPlanner(self.objective, self.model, layout, seed=self._seed, settings=self.planning)
-            search.improve(settings.think, settings.enough - settings.slack)
+            search.improve(settings.think, self.enough - settings.slack)
             best = search.plan()
             self.planning_seconds += search.seconds
             if best.steps:
