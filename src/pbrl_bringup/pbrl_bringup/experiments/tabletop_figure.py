@@ -65,7 +65,8 @@ def draw_run(desk: Desk, layouts: Sequence[Array], pictures: Pictures, outcome: 
     strip = pictures.strip()
     columns = min(len(strip), 3)
     rows = -(-len(strip) // columns)
-    figure, _ = canvas(0, width=3.7 * columns, height=2.5 * rows)
+    figure, _ = canvas(0, width=3.7 * columns, height=2.5 * rows + 0.4)
+    figure.suptitle("seen from across the table, the arm behind it: x grows to the left", fontsize=10)
     for number, (pushes, image) in enumerate(strip):
         panel = figure.add_subplot(rows, columns, number + 1)
         panel.imshow(image)
@@ -84,7 +85,7 @@ def draw_costs(starts: Sequence[Mapping[str, Any]], best: float, thesis: float, 
         missed = sum(not np.isfinite(each) for each in column)
         left.annotate(f"{missed} not" if missed else "", (k + 1, 1.0), xycoords=("data", "axes fraction"), ha="center")
     left.axhline(thesis, color="#c2185b", ls="--", lw=1.0)
-    left.text(0.6, thesis, "the thesis, with descent", color="#c2185b", va="bottom", fontsize=8)
+    left.text(3.45, thesis, "the thesis, with descent", color="#c2185b", ha="right", va="bottom", fontsize=8)
     left.set_yscale("log")
     left.set_ylabel("time until the table is nearly laid [s]")
     costs = [[each[name] for each in starts] for name in ("first", "without", "with_descent", "cost")]
