@@ -13,7 +13,18 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["numpy", "pydantic", "pyyaml", "mcap", "mcap-ros2-support", "scipy", "zstandard", "lz4"],
+    install_requires=[
+        "numpy",
+        "pydantic",
+        "pyyaml",
+        "mcap",
+        "mcap-ros2-support",
+        "scipy",
+        "zstandard",
+        "lz4",
+        "rosbags",
+        "apsw",
+    ],
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -126,7 +126,7 @@ def test_what_is_not_there_is_refused(tmp_path: Path, push_bag: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("storage_identifier: mcap", "storage_identifier: sqlite3", "ros2 bag convert"),
+        ("storage_identifier: mcap", "storage_identifier: paper", "ros2 bag convert"),
         ("rosbag2_bagfile_information", "something", "rosbag2_bagfile_information"),
         ("version: 9", "version: [9", "expected YAML"),
     ],

@@ -10,7 +10,7 @@ import numpy as np
 from pbrl_bag.mcap_file import McapFile
 from pbrl_bag.metadata import qos_from_text
 from pbrl_bag.qos import Qos
-from pbrl_bag.reader import files_of
+from pbrl_bag.reader import files_of, opened
 from pbrl_bag.types import Array
 
 FEWEST_FOR_GAPS = 10
@@ -54,7 +54,7 @@ class BagInfo:
 
     Attributes:
         path: folder or file.
-        files: MCAP files it is made of.
+        files: that it is made of.
         size: of the files [bytes].
         start: log time of the first message [s]; NaN without messages.
         duration: [s].
@@ -62,8 +62,8 @@ class BagInfo:
         topics: in order of name.
         finished: every file has its footer; False: the recorder crashed or still records.
         notes: what was lost, a sentence each.
-        profile: of the MCAP header; "ros2" for bags of ROS 2.
-        library: that wrote it.
+        profile: of the MCAP header; "ros2" for bags of ROS 2; empty for other storages.
+        library: that wrote it, likewise.
     """
 
     path: Path
@@ -80,14 +80,14 @@ class BagInfo:
 
 
 def describe(path: Path | str) -> BagInfo:
-    """Describe a bag folder or an MCAP file.
+    """Describe a bag folder or a bag's file.
 
     Raises:
-        BagError: nothing there, not an MCAP, or a damaged one.
+        BagError: nothing there, not a bag, or a damaged one.
     """
     path = Path(path)
     files = files_of(path)
-    scanned = [McapFile(name) for name in files]
+    scanned = [opened(name) for name in files]
     times: dict[str, list[int]] = {}
     types: dict[str, str] = {}
     for file in scanned:
@@ -96,8 +96,9 @@ def describe(path: Path | str) -> BagInfo:
             types[message.topic] = message.type
     start = min((min(stamps) for stamps in times.values()), default=0)
     end = max((max(stamps) for stamps in times.values()), default=0)
-    qos = {name: profiles for file in scanned for name, profiles in _qos(file).items()}
-    header = next((file.header for file in scanned if file.header), None)
+    ours = [file for file in scanned if isinstance(file, McapFile)]
+    qos = {name: profiles for file in ours for name, profiles in _qos(file).items()}
+    header = next((file.header for file in ours if file.header), None)
     return BagInfo(
         path=path,
         files=files,

@@ -8,7 +8,7 @@ A mapping is YAML. It names the source of each role (`object_poses`, `gripper_po
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -165,6 +165,12 @@ class Mapping(_Strict):
     scene_topic: str | None = None  # a topic of pbrl_msgs/Scene
     max_speed: Positive = 5.0  # [m/s] beyond it a pose stream jumps
     max_turn_rate: Positive = 12.0  # [rad/s]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_empty_sections(cls, data: Any) -> Any:
+        """Take a key with nothing but comments under it as one that is not there."""
+        return {key: value for key, value in data.items() if value is not None} if isinstance(data, dict) else data
 
     @model_validator(mode="after")
     def _names_agree(self) -> Mapping:

@@ -15,6 +15,8 @@ from pbrl_bag.yaml_text import parse_yaml
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
+STORAGES = ("mcap", "sqlite3")
+"""That can be read."""
 
 
 @dataclass
@@ -125,19 +127,26 @@ def read_metadata(folder: Path) -> dict[str, Any]:
 
 
 def files_of_bag(folder: Path) -> tuple[Path, ...]:
-    """Return the MCAP files of a bag folder, in order.
+    """Return the MCAP or SQLite files of a bag folder, in order.
 
     Raises:
-        BagError: no MCAP file, another storage, or a file that metadata.yaml names is not there.
+        BagError: no such file, another storage, or a file that metadata.yaml names is not there.
     """
     if not (folder / FILE_NAME).exists():
-        files = sorted(folder.glob("*.mcap"))
+        files = sorted(folder.glob("*.mcap")) or sorted(folder.glob("*.db3"))
         if not files:
-            raise BagError(f"{folder}: expected {FILE_NAME} and .mcap files, got neither; is it a bag?")
+            raise BagError(f"{folder}: expected {FILE_NAME} and .mcap or .db3 files, got neither; is it a bag?")
         return tuple(files)
     information = read_metadata(folder)
-    if (storage := information.get("storage_identifier")) != "mcap":
-        raise BagError(f"{folder}: expected storage mcap, got {storage!r}; convert it with `ros2 bag convert`")
+    if (storage := information.get("storage_identifier")) not in STORAGES:
+        raise BagError(
+            f"{folder}: expected storage {' or '.join(STORAGES)}, got {storage!r}; convert it with `ros2 bag convert`"
+        )
+    if information.get("compression_mode") not in (None, "", "NONE", "none") and storage != "mcap":
+        raise BagError(
+            f"{folder}: expected SQLite files that are not compressed, got compression mode "
+            f"{information.get('compression_mode')!r}; convert it with `ros2 bag convert`"
+        )
     names = information.get("relative_file_paths") or []
     if not isinstance(names, list):
         raise BagError(f"{folder}: {FILE_NAME}: relative_file_paths: expected a list, got {names!r}")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pbrl_bag.errors import BagError
+from pbrl_bag.foreign_bag import is_foreign
 from pbrl_bag.mcap_file import McapFile, RawMessage
 from pbrl_bag.metadata import qos_from_text
 from pbrl_bag.qos import Qos, default_qos
@@ -51,6 +52,8 @@ def load_bag(path: Path | str) -> LoadedBag:
     topics: dict[str, PlayedTopic] = {}
     notes: list[str] = []
     for name in files_of(path):
+        if is_foreign(name):
+            raise BagError(f"{name}: expected an MCAP to play, got another storage; play it with `ros2 bag play`")
         file = McapFile(name)
         messages += file.messages()
         for channel in file.channels.values():

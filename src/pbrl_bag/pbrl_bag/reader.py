@@ -1,4 +1,4 @@
-"""Reads a recording from a bag folder, an MCAP file, or a CSV file."""
+"""Reads a recording from a bag: MCAP, SQLite or ROS 1, a folder or a file; or from a CSV file."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from mcap_ros2.decoder import DecoderFactory
 from pbrl_bag.builder import RecordingBuilder
 from pbrl_bag.csv_reader import read_csv
 from pbrl_bag.errors import BagError
+from pbrl_bag.foreign_bag import ForeignBag, is_foreign
 from pbrl_bag.mapping import Mapping, load_mapping
 from pbrl_bag.mcap_file import McapFile, RawMessage
 from pbrl_bag.metadata import files_of_bag
@@ -25,7 +26,7 @@ def read_recording(path: Path | str, mapping: Path | str | None = None) -> Recor
     much was lost.
 
     Args:
-        path: a bag folder, an .mcap file, or a .csv file.
+        path: a bag folder (MCAP or SQLite), an .mcap, .db3 or .bag (ROS 1) file, or a .csv file.
         mapping: a mapping file; needed for CSV and for bags whose topics are not the contract's.
 
     Raises:
@@ -35,7 +36,7 @@ def read_recording(path: Path | str, mapping: Path | str | None = None) -> Recor
     rules = None if mapping is None else load_mapping(mapping)
     files = files_of(path)
     if path.suffix.lower() != ".csv":
-        return _read_mcap(path, files, rules)
+        return _read_bag(path, [opened(file) for file in files], rules)
     if rules is None:
         raise BagError(f"{path}: a CSV file needs a mapping that names its columns; see config/mappings/")
     return read_csv(path, rules)
@@ -48,8 +49,13 @@ def files_of(path: Path) -> tuple[Path, ...]:
         BagError: nothing there, or a folder that is no bag.
     """
     if not path.exists():
-        raise BagError(f"{path}: expected a bag folder, an .mcap file or a .csv file, got nothing of that name")
+        raise BagError(f"{path}: expected a bag folder, an .mcap, .db3, .bag or .csv file, got nothing of that name")
     return files_of_bag(path) if path.is_dir() else (path,)
+
+
+def opened(path: Path) -> McapFile | ForeignBag:
+    """Return a file of a bag by its ending; what is in it is looked at when it is read."""
+    return ForeignBag(path) if is_foreign(path) else McapFile(path)
 
 
 class Decoder:
@@ -91,12 +97,17 @@ class Decoder:
         return decoder
 
 
-def _read_mcap(path: Path, files: tuple[Path, ...], rules: Mapping | None) -> Recording:
+def _read_bag(path: Path, files: list[McapFile | ForeignBag], rules: Mapping | None) -> Recording:
     """Read the messages that play a role, in the order in which they were heard."""
     builder = RecordingBuilder(rules)
     total = 0
-    for name in files:
-        file = McapFile(name)
+    for file in files:
+        if isinstance(file, ForeignBag):  # in order already, and decoded while it is open
+            for message in file.messages():
+                total += 1
+                if builder.wants(message.topic):
+                    builder.add(message.topic, file.decode(message))
+            continue
         wanted = []
         for message in file.messages():
             total += 1

@@ -10,7 +10,6 @@ import signal
 import sys
 import traceback
 from collections.abc import Sequence
-from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
@@ -18,6 +17,8 @@ from typing import Annotated, Any
 
 import typer
 from typer.exceptions import TyperException
+
+from pbrl_bringup.cli_options import Bag, Domain, Engine, Likelihood, Many, Mapping, Out, Sampler, Seed
 
 # Errors whose message is for the person at the keyboard. Named, not imported: an error can only have
 # been raised by a module that is loaded, and loading all of them would slow every start.
@@ -42,38 +43,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-
-class Likelihood(StrEnum):
-    """Windowed multiple shooting, or one of its limits in the thesis: (25) and (39)."""
-
-    WINDOWED = "windowed"
-    ONE_STEP = "one_step"
-    INTEGRATED = "integrated"
-
-
-class Sampler(StrEnum):
-    """Samplers of `fit`."""
-
-    IMPORTANCE = "importance"
-    METROPOLIS = "metropolis"
-
-
-class Engine(StrEnum):
-    """Engines of `fit`."""
-
-    KERNEL = "kernel"
-    PYMUNK = "pymunk"
-
-
-Seed = Annotated[int, typer.Option(min=0, help="Seed of every random draw; the same seed gives the same result.")]
-Out = Annotated[Path, typer.Option(help="Folder for the results.")]
-Bag = Annotated[Path, typer.Argument(help="Bag folder, .mcap file, or .csv with --map.")]
-Mapping = Annotated[
-    Path | None, typer.Option("--map", help="Which topic or column plays which role in a foreign file.")
-]
-Domain = Annotated[int | None, typer.Option(min=0, max=101, help="ROS_DOMAIN_ID; by default the environment's own.")]
-Many = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 
 def _hand_over(command: str, **arguments: Any) -> int:
@@ -238,6 +207,19 @@ def play(
 def info(bag: Bag, mapping: Mapping = None) -> int:
     """Say what a recording holds: topics, rates, objects, grasps."""
     return _hand_over("info", bag=bag, mapping=mapping)
+
+
+@app.command("map", epilog="Example: ./pbrl map out/foreign --size table=1.2x0.8 --out mapping.yaml")
+def map_bag(
+    bag: Annotated[Path, typer.Argument(help="Bag folder, .mcap, .db3 or .bag file.")],
+    out: Annotated[Path, typer.Option(help="Mapping file to write; never one that is there.")] = Path("mapping.yaml"),
+    size: Annotated[
+        list[str] | None,
+        typer.Option(help="Length and width of a body [m], NAME=1.2x0.8; as often as there are bodies."),
+    ] = None,
+) -> int:
+    """Propose which stream of a foreign bag plays which role, with reasons, as a mapping file."""
+    return _hand_over("map", bag=bag, out=out, sizes=size or [])
 
 
 @app.command(epilog="Example: ./pbrl bench wheel --quick")

@@ -33,7 +33,14 @@ from pbrl_planner.tabletop import (
 )
 
 PLAIN = TabletopSettings(
-    travels=(0.05,), descent=False, climb=False, push_cost=0.0, shorten=False, nodes=100_000, time_limit=60.0
+    travels=(0.05,),
+    descent=False,
+    climb=False,
+    carry=False,
+    push_cost=0.0,
+    shorten=False,
+    nodes=100_000,
+    time_limit=60.0,
 )
 """The thesis's search without its descent."""
 WITH_DESCENT = PLAIN.model_copy(update={"descent": True})

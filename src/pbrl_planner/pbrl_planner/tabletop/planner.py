@@ -2,7 +2,9 @@
 
 The tree holds only layouts that pushes can reach, so its best one is always a plan: stop whenever you like. Three
 things make it grow: random layouts (`epsilon`), the best layout that DIRECTGD knows (by RRT-Connect), and, at the end,
-the objective itself, push by push from the best layout in the tree.
+the objective itself, push by push from the best layout in the tree. Where items stand in each other's way the tree is
+deadlocked (thesis 3.2): each item alone is then brought to its place in a good layout, and who stands there steps
+aside.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ import numpy as np
 
 from pbrl_control.planar import Array
 from pbrl_planner.errors import PlannerError
+from pbrl_planner.tabletop.carry_kernel import carry
+from pbrl_planner.tabletop.carrying import exchanged, in_the_way, steps_aside
 from pbrl_planner.tabletop.descent import descend
 from pbrl_planner.tabletop.desk import Desk
 from pbrl_planner.tabletop.displacement import ForwardModel
@@ -22,12 +26,22 @@ from pbrl_planner.tabletop.plan import Step, TabletopPlan
 from pbrl_planner.tabletop.primitives import Push, pushes_of
 from pbrl_planner.tabletop.settings import TabletopSettings
 from pbrl_planner.tabletop.shorten import shortened
-from pbrl_planner.tabletop.tree_kernel import PushTables, Tree, connect, grow, push_fault
+from pbrl_planner.tabletop.tree_kernel import PushTables, Tree, apart, connect, grow, push_fault
 
 GREEDY_STEPS = 50
 """Of a connection before it is looked how good what it found is."""
 WORTH = 1e-6
 """By which the objective has to fall to count as better."""
+GOALS = 12
+"""Good layouts that are kept to be gone for."""
+THERE = 0.02
+"""An item so near to its place [m] is there; the objective does the rest."""
+CARRIED = 6000
+"""Poses of one item that are looked at on its way."""
+ASIDE = 20
+"""Places that are drawn for an item that is in the way."""
+PASSES = 3
+"""Over all items, to bring each to its place."""
 
 
 def push_tables(desk: Desk, model: ForwardModel, pushes: tuple[Push, ...], settings: TabletopSettings) -> PushTables:
@@ -104,6 +118,8 @@ class TabletopPlanner:
         self.first_cost = objective(self.start)
         self.best, self.best_cost, self._least = 0, self.first_cost, self.first_cost
         self.goal, self.goal_cost = self.start, np.inf
+        self._goals: list[tuple[float, Array]] = []
+        self._enough = -np.inf
         self.seconds = 0.0
         self.history = [(0.0, self.first_cost)]
 
@@ -118,6 +134,7 @@ class TabletopPlanner:
             Whether it is reached.
         """
         begun, before = time.perf_counter(), self.seconds
+        self._enough = enough
         for _ in self._rounds():
             self.seconds = before + time.perf_counter() - begun
             self._take_stock()
@@ -168,7 +185,10 @@ class TabletopPlanner:
                 greedy -= steps
                 yield
             if self.settings.climb:
-                self._descend_by_pushes()
+                self._descend_by_pushes(self.best)
+                yield
+            if self.settings.carry and self._goals:
+                self._descend_by_pushes(self._carry_to(self._goals[int(self._rng.integers(len(self._goals)))][1]))
                 yield
             for _ in range(0, self.settings.every, GREEDY_STEPS):
                 samples = self._random_layouts(int(self._rng.binomial(GREEDY_STEPS, self.settings.epsilon)))
@@ -188,6 +208,7 @@ class TabletopPlanner:
             layout, cost = descend(self.objective, start, self.settings.margin, self.settings.orientation)
             if cost < self.goal_cost - WORTH:
                 self.goal, self.goal_cost = layout, cost
+            self._goals = sorted([*self._goals, (cost, layout)], key=lambda each: each[0])[:GOALS]
 
     def _free_layout(self) -> Array | None:
         """Return a random layout that is free of collision; None where twenty draws a thing found none."""
@@ -206,13 +227,54 @@ class TabletopPlanner:
         low, high = np.append(self.desk.table.low, -np.pi), np.append(self.desk.table.high, np.pi)
         return self._rng.uniform(low, high, (count, len(self.desk.items), 3))
 
-    def _descend_by_pushes(self) -> None:
-        """Add the push from the best layout that makes the objective smallest, and again, as long as one does."""
+    def _carry_to(self, goal: Array) -> int:
+        """Bring one item after the other to its place in a layout, from the best one; return the last row."""
+        row, settings = self.best, self.settings
+        goal = exchanged(self.objective, self.tree.layouts[row], goal)
+        for _ in range(PASSES):
+            missing = 0
+            for item in self._rng.permutation(len(goal)).tolist():
+                row = self._carried(row, item, goal[item])
+                layout = self.tree.layouts[row]
+                if apart(layout[item], goal[item], settings.orientation) <= THERE**2:
+                    continue
+                missing += 1
+                for other in in_the_way(self.desk, layout, item, goal[item], settings.margin):
+                    places = self._random_layouts(ASIDE)[:, other]
+                    free = steps_aside(self.desk, layout, other, places, (item, goal[item]), settings.margin)
+                    row = row if free is None else self._carried(row, other, free)
+            if not missing or self.count >= settings.nodes:
+                break
+        return row
+
+    def _carried(self, row: int, item: int, place: Array) -> int:
+        """Add the pushes that bring an item from a row to a place, or nearer to it; return the last row."""
+        via = np.empty(CARRIED, dtype=np.int64)
+        layout, kinds = self.tree.layouts[row], len(self.pushes)
+        length = carry(layout, item, place, self.settings.orientation, THERE, CARRIED, self.tables, via)
+        for kind in via[:length].tolist():
+            if self.count >= self.settings.nodes:
+                break
+            there = self.tree.layouts[row].copy()
+            push_fault(self.tree.layouts[row], item, kind, self.tables, there[item])
+            row = self._add(row, item * kinds + kind, there)
+        return row
+
+    def _add(self, row: int, via: int, layout: Array) -> int:
+        """Add a layout that a push leads to; return its row."""
+        new = self.count
+        self.tree.layouts[new], self.tree.parent[new], self.tree.via[new] = layout, row, via
+        self.tree.depth[new] = self.tree.depth[row] + 1
+        self.tree.tried[new], self.tree.tried[row, via] = 0, 1
+        self.count += 1
+        return new
+
+    def _descend_by_pushes(self, row: int) -> None:
+        """Add the push from a layout that makes the objective smallest, and again, as long as one does."""
         self._take_stock()
         items, kinds = self.tables.clearance.shape
-        new = np.empty(3)
+        new, cost = np.empty(3), self.objective(self.tree.layouts[row])
         while self.count < self.settings.nodes:
-            row = self.best
             layout = self.tree.layouts[row]
             found, via = [], []
             for code in range(items * kinds):
@@ -226,21 +288,19 @@ class TabletopPlanner:
                 return
             costs = self.objective.many(np.array(found))
             k = int(np.argmin(costs))
-            if costs[k] >= self.best_cost - self.settings.push_cost - WORTH:
+            if costs[k] >= cost - self.settings.push_cost - WORTH:
                 return
-            self.tree.layouts[self.count] = found[k]
-            self.tree.parent[self.count], self.tree.via[self.count] = row, via[k]
-            self.tree.depth[self.count] = self.tree.depth[row] + 1
-            self.tree.tried[self.count], self.tree.tried[row, via[k]] = 0, 1
-            self.count += 1
+            row, cost = self._add(row, via[k], found[k]), float(costs[k])
             self._take_stock()
 
     def _take_stock(self) -> None:
-        """Value the layouts that are new, and note the best."""
+        """Value the layouts that are new, and note the best; what is better than enough counts no more than enough."""
         if self._valued == self.count:
             return
         costs = self.objective.many(self.tree.layouts[self._valued : self.count])
         whole = costs + self.settings.push_cost * self.tree.depth[self._valued : self.count]
+        if (costs <= self._enough).any() and self.best_cost > self._enough:
+            whole, self._least = np.where(costs <= self._enough, whole, np.inf), np.inf
         k = int(np.argmin(whole))
         if whole[k] < self._least - WORTH:
             self.best, self.best_cost, self._least = self._valued + k, float(costs[k]), float(whole[k])

@@ -24,6 +24,7 @@ class TabletopSettings(Section):
         descent: use DIRECTGD; without it the greedy steps go to the best layout in the tree.
         descents: that are begun each time, one of them in the tree's best layout.
         climb: go on from the best layout by whatever push the objective likes most; the thesis does not.
+        carry: bring each item alone to its place in a good layout, by A*; the thesis does not.
         push_cost: by which the objective has to fall for a push to be worth making.
         every: steps between two times that the descent is asked.
         nodes: most in the tree.
@@ -41,6 +42,7 @@ class TabletopSettings(Section):
     descent: bool = True
     descents: Annotated[int, Field(ge=1, le=1000)] = 4
     climb: bool = True
+    carry: bool = True
     push_cost: NotNegative = 0.001
     every: Annotated[int, Field(ge=1)] = 200
     nodes: Annotated[int, Field(ge=2, le=1_000_000)] = 20_000

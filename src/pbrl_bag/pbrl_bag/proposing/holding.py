@@ -1,0 +1,85 @@
+"""When a gripper held an object, from their poses alone: while the object moved, the gripper kept its place on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pbrl_bag.types import Array
+
+MOVING = 0.01
+"""Faster than this [m/s] an object moves."""
+KEPT = 0.03
+"""A gripper that holds stays so near to its place on the object [m]."""
+FEWEST = 5
+"""Samples in which an object has to move."""
+SMOOTH = 0.2
+"""Speeds are taken over so long [s]: tags jitter by millimetres."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """A gripper on an object.
+
+    Attributes:
+        start, end: when [s].
+        contact: (2,) the gripper's place in the object's frame [m].
+        share: of the time in which the object moved that it was held, 0..1.
+    """
+
+    start: float
+    end: float
+    contact: Array
+    share: float
+
+
+def extent(rows: Array) -> float:
+    """Return how far poses (n, 8) reach apart on the floor [m]."""
+    return float(np.hypot(*np.ptp(rows[:, 1:3], axis=0))) if len(rows) else 0.0
+
+
+def speeds(rows: Array) -> Array:
+    """Return (n,) speeds of poses (n, 8) on the floor [m/s]."""
+    time = rows[:, 0]
+    before, after = time - 0.5 * SMOOTH, time + 0.5 * SMOOTH
+    x, y = (np.interp(after, time, rows[:, k]) - np.interp(before, time, rows[:, k]) for k in (1, 2))
+    span = np.minimum(after, time[-1]) - np.maximum(before, time[0])
+    return np.asarray(np.hypot(x, y) / np.maximum(span, 1e-9))
+
+
+def held(of: Array, by: Array) -> Held | None:
+    """Tell whether, when and where an object was held.
+
+    Args:
+        of: poses of the object (n, 8).
+        by: poses of the gripper (m, 8), in the same frame.
+
+    Returns:
+        None where the object did not move, or the gripper did not go along.
+    """
+    if len(of) < FEWEST or len(by) < FEWEST:
+        return None
+    inside = (of[:, 0] >= by[0, 0]) & (of[:, 0] <= by[-1, 0])
+    rows = of[inside]
+    if len(rows) < FEWEST or not np.isfinite(rows).all():
+        return None
+    hand = np.column_stack([np.interp(rows[:, 0], by[:, 0], by[:, k]) for k in (1, 2, 3)])
+    place = Rotation.from_quat(rows[:, 4:8]).inv().apply(hand - rows[:, 1:4])[:, :2]
+    moving = speeds(rows) > MOVING
+    if moving.sum() < FEWEST:
+        return None
+    contact = np.median(place[moving], axis=0)
+    near = np.hypot(*(place - contact).T) < KEPT
+    share = float(near[moving].mean())
+    if share < 0.5:
+        return None
+    together = np.flatnonzero(moving & near)
+    first, last = int(together[0]), int(together[-1])
+    # It was held a little before it moved, and after: as long as the gripper stood where it holds.
+    while first > 0 and near[first - 1]:
+        first -= 1
+    while last + 1 < len(near) and near[last + 1]:
+        last += 1
+    return Held(float(rows[first, 0]), float(rows[last, 0]), contact, share)

@@ -1,0 +1,140 @@
+"""Proposals for foreign bags: right roles with reasons, a mapping that reads, and honest gaps."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from pbrl_bag import BagError, BagWriter, load_mapping, read_recording
+from pbrl_bag.proposing import mapping_text, propose
+from pbrl_bag.proposing.holding import held
+from pbrl_bag.proposing.proposal import side_of
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from foreign_push import CLOSED, CONTACT, LABS, OPENED, recorded
+
+WANTED = {
+    "other topics": ("right", "table_7"),
+    "transforms": ("left", "desk"),
+    "odometry": ("left", "cart"),
+    "other frames": ("left", "crate"),
+    "one hand": ("left", "sofa"),
+}
+
+
+def bag_of(folder: Path, messages: list) -> Path:
+    with BagWriter(folder, live=False) as writer:
+        for topic, kind, message, when in messages:
+            writer.write(topic, kind, message, when)
+    return folder
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_roles_are_found_whatever_the_laboratory_calls_them(lab: str, tmp_path: Path) -> None:
+    bag = bag_of(tmp_path / "bag", recorded(LABS[lab]))
+    proposal = propose(bag)
+    side, body = WANTED[lab]
+    mapping = proposal.mapping
+    assert mapping is not None
+    assert set(mapping.wrenches) == {side}, proposal.streams
+    assert set(mapping.gripper_poses) == {side}
+    assert len(mapping.object_poses) == 1
+    name = next(iter(mapping.object_poses))
+    assert body in name
+    assert all(each.why for each in proposal.streams)
+    assert {each.stream for each in proposal.streams if not each.role} == {"/chair/pose", "/tf (base_link)"}
+    (grasp,) = mapping.grasps
+    assert (grasp.gripper, grasp.object) == (side, name)
+    np.testing.assert_allclose(grasp.contact, CONTACT, atol=0.005)
+    assert grasp.start == pytest.approx(CLOSED, abs=0.2)
+    assert grasp.end == pytest.approx(OPENED, abs=0.2)
+    path = tmp_path / "mapping.yaml"
+    path.write_text(mapping_text(proposal, str(bag), {name: (1.2, 0.8)}))
+    assert "outline" not in path.read_text(), "what is told is not to do any more"
+    recording = read_recording(bag, path)
+    assert [each.object for each in recording.grasps] == [name]
+    seen, hand = recording.object_poses[name], recording.gripper_poses[side]
+    rows = [np.column_stack([each.time, each.position, each.quaternion]) for each in (seen, hand)]
+    together = held(*rows)
+    assert together is not None
+    np.testing.assert_allclose(together.contact, CONTACT, atol=0.005)
+
+
+def test_what_no_bag_tells_is_left_to_do_and_not_made_up(tmp_path: Path) -> None:
+    bag = bag_of(tmp_path / "bag", recorded(LABS["one hand"]))
+    proposal = propose(bag)
+    assert any("outline of 'sofa'" in each for each in proposal.left)
+    text = mapping_text(proposal, "bag", {})
+    path = tmp_path / "mapping.yaml"
+    path.write_text(text)
+    with pytest.raises(BagError, match="body 'sofa' has no geometry"):
+        load_mapping(path)
+    assert yaml.safe_load(text)["bodies"] is None
+    assert "# To do: the outline of 'sofa'" in text
+
+
+def test_a_bag_of_the_contract_needs_no_mapping(push_bag: Path) -> None:
+    proposal = propose(push_bag)
+    assert proposal.mapping is None
+    assert {each.role for each in proposal.streams} == {
+        "object_poses.table",
+        "gripper_poses.left",
+        "wrenches.left",
+        "grasps",
+        "scene",
+    }
+
+
+def test_without_a_force_or_a_motion_it_is_said(tmp_path: Path) -> None:
+    lab = LABS["one hand"]
+    silent = bag_of(tmp_path / "silent", [each for each in recorded(lab) if each[0] != lab.wrench])
+    assert any("no WrenchStamped" in each for each in propose(silent).left)
+    still = bag_of(tmp_path / "still", [each for each in recorded(lab) if each[0] != lab.table])
+    assert any("no pose of a thing that moved" in each for each in propose(still).left)
+    handless = bag_of(tmp_path / "handless", [each for each in recorded(lab) if each[0] != lab.hand])
+    assert any("no pose of the left sensor" in each for each in propose(handless).left)
+
+
+def test_frames_that_nothing_links_are_said(tmp_path: Path) -> None:
+    messages = [each for each in recorded(LABS["other frames"]) if each[0] != "/tf_static"]
+    left = propose(bag_of(tmp_path / "bag", messages)).left
+    assert any("where 'robot' is in 'ceiling' is not in the bag" in each for each in left)
+
+
+def test_a_csv_file_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(BagError, match="mapped by hand"):
+        propose(tmp_path / "door.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "side"),
+    [
+        ("/left/ft", "left"),
+        ("l_gripper", "left"),
+        ("/arm_right", "right"),
+        ("/r/wrench", "right"),
+        ("/table", ""),
+        ("lr", ""),
+    ],
+)
+def test_sides_are_words_of_their_own(name: str, side: str) -> None:
+    assert side_of(name) == side
+
+
+def test_a_hand_that_stays_behind_holds_nothing() -> None:
+    time = np.arange(0.0, 5.0, 0.05)
+    table = np.column_stack([time, 0.1 * time, *np.zeros((5, len(time))), np.ones(len(time))])
+    hand = table.copy()
+    hand[:, 1] = -0.5
+    assert held(table, hand) is None
+    hand[:, 1] = table[:, 1] - 0.5
+    together = held(table, hand)
+    assert together is not None
+    assert together.share == 1.0
+    assert math.isclose(together.contact[0], -0.5, abs_tol=1e-9)
