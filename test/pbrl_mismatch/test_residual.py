@@ -72,6 +72,22 @@ def test_coverage_of_a_random_wrench_is_as_stated(track: Any) -> None:
     assert np.all((share > 0.90) & (share < 0.99)), share
 
 
+@pytest.mark.parametrize("angle", [-10.0, 0.3])
+def test_where_contacts_are_stiff_a_covariance_stays_one(track: Any, angle: float) -> None:
+    # A small body that is not there: rounding once grew beside the symmetric part until all was lost.
+    rng = np.random.default_rng(2)
+    low, high = track.seen[:, :2].min(axis=0) - 0.6, track.seen[:, :2].max(axis=0) + 0.6
+    for _ in range(6):
+        x, y = rng.uniform(low, high)
+        row = table_row(unseen_force=9.0, unseen_x=x, unseen_y=y, unseen_radius=0.06, unseen_angle=angle)
+        for size in (0.1, 1.0):
+            found = residual_wrench(track, row, size=size)
+            np.testing.assert_array_equal(found.covariance, np.swapaxes(found.covariance, -1, -2))
+            assert np.linalg.eigvalsh(found.covariance)[:, 0].min() > 0.0
+            assert np.abs(found.state[:, :2] - track.seen[:, :2]).max() < 0.5
+            assert np.isfinite(found.log_likelihood)
+
+
 def test_body_axes_are_a_turn_of_world_axes(track: Any) -> None:
     found = residual_wrench(track, table_row(), size=1.0)
     np.testing.assert_allclose(np.hypot(*found.body[:, :2].T), np.hypot(*found.world[:, :2].T), atol=1e-12)

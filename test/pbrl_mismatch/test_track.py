@@ -10,6 +10,7 @@ import pytest
 
 from pbrl_bag.types import Recording
 from pbrl_mismatch import MismatchError, track_of
+from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.track import CLOSING, ROLLING, after_closing, lay_track
 from pbrl_model.fitting.fit import body_of, motions_of
 from pbrl_model.sensing.motion import Motion
@@ -45,6 +46,19 @@ def test_of_a_body_that_rolls_the_first_moments_are_left_out(motion: Motion) -> 
     assert cut.pose_time[0] >= cut.time[0] and len(cut.pose_time) == len(cut.pose)
     short = replace(rolling, time=rolling.time[: 2 * first + 1], wrench=rolling.wrench[: 2 * first])
     assert after_closing(short) is short
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.01, 0.03])
+def test_the_start_of_a_grasp_is_not_taken_for_rest(recording: Recording, motion: Motion, speed: float) -> None:
+    # Taken for rest, a centimetre a second that is left of the last push looks like a blow, in every clean recording.
+    geometry = recording.bodies["table"]
+    track = lay_track(recording, [at_speed(motion, speed)], geometry, body_of(geometry, motion.oriented))
+    for length in (1.0, 2.0):
+        cuts = cut_windows(track, length)
+        (first,) = np.flatnonzero(cuts.span[:, 0] == cuts.span[:, 2])
+        np.testing.assert_array_equal(cuts.told[first], track.motions[0].state[0])
+        spread = np.sqrt(np.diag(cuts.root[first] @ cuts.root[first].T))
+        assert (spread >= np.sqrt(np.diag(motion.covariance[0]))).all()
 
 
 def test_the_sensor_s_wrench_turned_back_is_what_acts_at_the_centre_of_mass(recording: Recording) -> None:

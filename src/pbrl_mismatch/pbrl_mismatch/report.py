@@ -25,7 +25,7 @@ NAMED = 0.5
 EXPLAINED = 1.35
 """A hypothesis that needs a larger scale of the noise than this has not reached the noise floor."""
 SHARE_LEFT, NEAR = 0.1, 2.0
-"""Unless it leaves less than this share of the baseline's misfit unexplained, and needs a scale below this."""
+"""Unless it leaves less than this share of the baseline's scale, as a logarithm, and needs a scale below this."""
 ALIKE = 3.0
 """Hypotheses within so many nats explain the recording alike."""
 SHOWN = 8
@@ -90,15 +90,13 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene) ->
     if not others:
         return Findings((), (), ())
     best, notes = others[0], []
-    count = baseline.peak.objective.observations
-    before, after = (float(each.peak.misfit[0].sum()) / count - 1.0 for each in (baseline, best.fitted))
-    scale = best.fitted.noise_scale
-    reached = scale < EXPLAINED or (scale < NEAR and before > 0.0 and after < SHARE_LEFT * before)
+    scale, before = best.fitted.usual_scale, baseline.usual_scale
+    reached = scale < EXPLAINED or (scale < NEAR and math.log(scale) < SHARE_LEFT * math.log(before))
     named = best is weighed[0] and best.probability >= NAMED and reached and not best.vetoed
     if not reached:
         notes.append(
             f"nothing in the library reaches the noise floor: the likeliest, {' and '.join(best.effects)}, "
-            f"is still off by {best.fitted.noise_scale:.1f} times the noise"
+            f"is still off by {scale:.1f} times the noise"
         )
     if not bool(best.fitted.peak.settled[0]):
         notes.append(f"the fit of {' and '.join(best.effects)} had not settled: its numbers are rough")

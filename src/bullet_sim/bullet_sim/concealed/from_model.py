@@ -22,12 +22,14 @@ BALLAST_SHARES = (0.15, 0.3, 0.45, 0.6)
 """Shares of a body's mass that are tried as ballast: the less, the further out it has to stand."""
 LEAST_SLIDING = 1e-3
 """Sliding friction of feet that do nothing but stick."""
-CRATE_FRICTION = 0.4
-"""Of an unseen body; its mass is what then needs the force that was found."""
+CRATE_FRICTION = 0.15
+"""Of an unseen body, so low that it slides and does not tip; its mass is what then needs the force that was found."""
 LEAST_GIVE = 1e-5
 """Of a hold [m/N]: stiffer ones are all alike, and one that a fit takes below zero is stiff."""
 CORNERS = 16
 """Of a disc."""
+DISC = -10.0
+"""An `unseen_angle` at or below it means one."""
 
 
 @dataclass(frozen=True)
@@ -238,7 +240,10 @@ def _hidden_obstacle(told: Told) -> dict[str, Any]:
 
 def _unseen_body(told: Told) -> dict[str, Any]:
     mass = told["unseen_force"] / (CRATE_FRICTION * GRAVITY)
-    crate = {"polygon": _disc(told, "unseen"), "pose": [*told.place("unseen"), 0.0], "nominal_mass": mass}
+    half, angle = told["unseen_radius"], told.get("unseen_angle", DISC)
+    square = [[half * x, half * y] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    outline, turn = (square, angle) if angle > DISC else (_disc(told, "unseen"), 0.0)
+    crate = {"polygon": outline, "pose": [*told.place("unseen"), turn], "nominal_mass": mass}
     return {"unseen_body": [{**crate, "friction": CRATE_FRICTION}]}
 
 

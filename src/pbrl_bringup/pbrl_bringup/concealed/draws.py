@@ -25,6 +25,8 @@ DRIFTING = 10.0
 """A drift is as large as a step after so long [s]."""
 NEAR_AXLE = 0.01
 """Of a pin from a wheel's axle, as a standard deviation [m]."""
+CRATE = 0.15
+"""Half the side of an unseen crate [m]."""
 FREE = 0.02
 """Between a hidden body and the table as it stands at the start [m]."""
 
@@ -157,10 +159,11 @@ def hidden_obstacle(rng: np.random.Generator, stage: Stage, strength: float) -> 
 
 
 def unseen_body(rng: np.random.Generator, stage: Stage, strength: float) -> dict[str, object]:
-    """Draw a crate that the table meets and pushes on."""
-    polygon = np.array(_in_the_way(rng, stage, 0.15, 0.1))
+    """Draw a crate that the table meets and pushes on: so smooth below that it slides before it tips."""
+    polygon = np.array(_in_the_way(rng, stage, CRATE, 0.1))
     middle = polygon.mean(axis=0)
-    mass, friction = between(2.0, 15.0, strength), float(rng.uniform(0.2, 0.4))
+    tips = CRATE / float(stage.table.get("height", 0.7775))  # type: ignore[arg-type]
+    mass, friction = between(5.0, 30.0, strength), float(rng.uniform(0.4, 0.9)) * tips
     told = {"polygon": (polygon - middle).tolist(), "pose": [*middle.tolist(), 0.0]}
     return {"unseen_body": [{**told, "nominal_mass": mass, "friction": friction}]}
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bullet_sim.concealed.truth import wheel_truth
 from bullet_sim.scene import Scene
+from pbrl_bringup.concealed.draws import CRATE
 from pbrl_bringup.concealed.stage import NAME
 
 GRAVITY = 9.81
@@ -169,7 +170,8 @@ def _unseen(told: Any, scene: Scene, mass: float) -> dict[str, float]:
     return {
         "unseen_x": told["pose"][0],
         "unseen_y": told["pose"][1],
-        "unseen_radius": 0.15,
+        "unseen_radius": CRATE,
+        "unseen_angle": told["pose"][2],
         "unseen_force": told["nominal_mass"] * GRAVITY * told["friction"],
     }
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.data.missing import known_windows
 from pbrl_mismatch.data.track import Track
-from pbrl_model.sensing.windows import POSE_RATE, Windows
+from pbrl_model.sensing.windows import POSE_RATE, WIDENING, Windows
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,13 @@ def cut_windows(track: Track, length: float, *, rate: float = POSE_RATE) -> Cuts
     starts = np.array([motion.time[0] for motion in track.motions])
     first = np.round((windows.start - starts[episode]) / track.dt).astype(np.int64) + track.begin[episode]
     span = np.stack([first, windows.steps, track.begin[episode], track.last[episode]], -1)
-    values, vectors = np.linalg.eigh(windows.covariance)
+    initial, covariance = windows.initial.copy(), windows.covariance.copy()
+    # A body that was let go may still roll when it is taken again, at a centimetre a second say, which smoothing does
+    # not tell from rest: what is taken for rest and is none looks like a blow.
+    for w in np.flatnonzero(span[:, 0] == span[:, 2]):
+        motion = track.motions[int(episode[w])]
+        initial[w], covariance[w] = motion.state[0], WIDENING * motion.covariance[0]
+    values, vectors = np.linalg.eigh(covariance)
     # Plates that close on a body which is not at rest stop it by a knock: smoothed poses do not know its speed then.
     scale = np.where(span[:, 0] == span[:, 2], KNOCKED, 1.0)
     seen = windows.seen.any(axis=2)
@@ -97,7 +103,7 @@ def cut_windows(track: Track, length: float, *, rate: float = POSE_RATE) -> Cuts
         np.ascontiguousarray(span, dtype=np.int64),
         track.pivot[episode],
         place,
-        windows.initial,
+        initial,
         scale[:, None, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :],
         windows.pose,
         _weights(windows),

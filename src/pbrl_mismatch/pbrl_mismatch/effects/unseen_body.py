@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain, positive
+from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, Values, Where, disc, plain, positive, rectangle
+from pbrl_mismatch.kernels.crate_kernel import ROUND
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -12,18 +13,22 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         plain("unseen_x", float(scene.middle[0]), float(scene.reach[0])),
         plain("unseen_y", float(scene.middle[1]), float(scene.reach[1])),
         positive("unseen_radius", 0.15, 0.5),
+        plain("unseen_angle", 0.0, 0.5),
     )
 
 
 def where(values: Values, scene: Scene) -> Where | None:
     """Return the place that it has."""
-    return disc("floor", values["unseen_x"], values["unseen_y"], values["unseen_radius"])
+    x, y, half = values["unseen_x"], values["unseen_y"], values["unseen_radius"]
+    if "unseen_angle" in values:
+        return rectangle("floor", x, y, half, half, values["unseen_angle"])
+    return disc("floor", x, y, half)
 
 
 EFFECT = Effect(
     name="unseen_body",
     summary="A movable thing that is not in the scene is met on the way and pushed along.",
-    equation="contact with a disc that slides when it is pressed with more than F",
+    equation="contact with a disc or a square that slides, and turns, when it is pressed with more than F",
     shows="Go back to where it was met: it is gone.",
     parameters=parameters,
     variants=(
@@ -33,10 +38,19 @@ EFFECT = Effect(
             "unseen_y",
             "unseen_radius",
         ),
+        (
+            "unseen_force",
+            "unseen_x",
+            "unseen_y",
+            "unseen_radius",
+            "unseen_angle",
+        ),
     ),
+    fixed={"unseen_angle": ROUND},
     where=where,
     place=("unseen_x", "unseen_y"),
     direction="contact",
+    angles=("unseen_angle",),
     linear=("unseen_force",),
     remembers=True,
     touches=("unseen_x", "unseen_y", "unseen_radius"),

@@ -10,38 +10,11 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP, SETTLING, push, resist
+from pbrl_mismatch.kernels.crate_kernel import HELD, ROUND, STIFFNESS, crate_contact, move_crate
+from pbrl_mismatch.kernels.outline_kernel import nearest_edge
 from pbrl_mismatch.kernels.state import UNSEEN
 
 Array = NDArray[np.float64]
-
-UNSEEN_STIFFNESS = 5000.0
-"""Stiffness of the contact with an unseen body [N/m]."""
-
-
-@njit(cache=True, error_model="numpy")
-def nearest_edge(outline: Array, bx: float, by: float) -> tuple[float, float, float, float, float]:
-    """Return the signed distance of a point to a counter-clockwise polygon, the nearest point, and the normal there.
-
-    The normal points from the polygon to the outside.
-    """
-    best, px, py, nx, ny, inside = math.inf, 0.0, 0.0, 0.0, 0.0, False
-    corners = outline.shape[0]
-    for i in range(corners):
-        ax, ay = outline[i, 0], outline[i, 1]
-        ex, ey = outline[(i + 1) % corners, 0] - ax, outline[(i + 1) % corners, 1] - ay
-        share = ((bx - ax) * ex + (by - ay) * ey) / (ex * ex + ey * ey)
-        share = min(max(share, 0.0), 1.0)
-        qx, qy = ax + share * ex, ay + share * ey
-        distance = math.sqrt((bx - qx) ** 2 + (by - qy) ** 2)
-        if distance < best:
-            best, px, py = distance, qx, qy
-            length = math.sqrt(ex * ex + ey * ey)
-            nx, ny = ey / length, -ex / length
-        if (ay > by) != (ay + ey > by) and bx < ax + (by - ay) / ey * ex:
-            inside = not inside
-    if not inside and best > 1e-9:
-        nx, ny = (bx - px) / best, (by - py) / best
-    return (-best if inside else best), px, py, nx, ny
 
 
 @njit(cache=True, error_model="numpy")
@@ -58,8 +31,11 @@ def contact(
 @njit(cache=True, error_model="numpy")
 def move_unseen(p: Array, outline: Array, state: Array, c: float, s: float, com: Array) -> None:
     """Let the unseen body slide away from a footprint that presses it harder than its friction holds."""
+    if p[at.UNSEEN_ANGLE] > ROUND:
+        move_crate(p, outline, state, c, s, com)
+        return
     depth, _, _, nx, ny = contact(p, outline, state, c, s, com, state[UNSEEN], state[UNSEEN + 1], p[at.UNSEEN_RADIUS])
-    slid = depth - p[at.UNSEEN_FORCE] / UNSEEN_STIFFNESS
+    slid = depth - p[at.UNSEEN_FORCE] / STIFFNESS
     if slid > 0.0:
         state[UNSEEN] += slid * nx
         state[UNSEEN + 1] += slid * ny
@@ -112,11 +88,13 @@ def contacts(
                 slip = (state[4] + state[5] * rx) * nx - (state[3] - state[5] * ry) * ny
                 grip = p[at.OBSTACLE_FRICTION] * k * depth / math.sqrt(slip * slip + CREEP * CREEP)
                 resist(acc, rx, ry, -ny, nx, grip)
-    if p[at.UNSEEN_FORCE] > 0.0:
+    if p[at.UNSEEN_FORCE] > 0.0 and p[at.UNSEEN_ANGLE] > ROUND:
+        crate_contact(p, outline, state, c, s, com, dt, acc)
+    elif p[at.UNSEEN_FORCE] > 0.0:
         found = contact(p, outline, state, c, s, com, state[UNSEEN], state[UNSEEN + 1], p[at.UNSEEN_RADIUS])
         depth, rx, ry, nx, ny = found
         if depth > 0.0:
-            force = min(UNSEEN_STIFFNESS * depth, p[at.UNSEEN_FORCE])
+            force = min(STIFFNESS * depth, p[at.UNSEEN_FORCE])
             push(acc, rx, ry, -force * nx, -force * ny)
-            if force < 0.999 * p[at.UNSEEN_FORCE]:
-                resist(acc, rx, ry, nx, ny, UNSEEN_STIFFNESS * (dt + SETTLING))
+            if force < HELD * p[at.UNSEEN_FORCE]:
+                resist(acc, rx, ry, nx, ny, STIFFNESS * (dt + SETTLING))

@@ -40,6 +40,14 @@ def correct(mean: Array, spread: Array, slope: Array, residual: float, variance:
 
 
 @njit(cache=True, error_model="numpy")
+def make_symmetric(spread: Array) -> None:
+    """Take out of a covariance what rounding leaves beside its symmetric part: no observation would ever correct it."""
+    for k in range(SIZE):
+        for i in range(k):
+            spread[i, k] = spread[k, i] = 0.5 * (spread[i, k] + spread[k, i])
+
+
+@njit(cache=True, error_model="numpy")
 def see(p: Array, mean: Array, com: Array, part: float, dt: float, state: Array, out: Array) -> None:
     """Write the pose (3,) that tags would see a share `part` of a step after a state."""
     for k in range(6):
@@ -174,6 +182,7 @@ def smooth_episode(
         x[:6] = trial[:6]
         x[6:] *= kept
         c = move @ c @ move.T
+        make_symmetric(c)
         for k in range(6):
             c[k, k] += TINY
         for k in range(3):
@@ -186,6 +195,7 @@ def smooth_episode(
         gain = np.linalg.solve(ahead[t], moves[t] @ spread[t]).T
         mean[t] += gain @ (mean[t + 1] - ahead_mean[t])
         spread[t] += gain @ (spread[t + 1] - ahead[t]) @ gain.T
+        make_symmetric(spread[t])
     return value
 
 

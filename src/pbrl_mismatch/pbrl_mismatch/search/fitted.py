@@ -119,6 +119,17 @@ class Fitted:
         simulated = float(self.peak.sigma[0])
         return simulated if self.traced is None else min(simulated, self.traced.noise_scale)
 
+    @property
+    def usual_scale(self) -> float:
+        """Return the scale of the noise that its windows need as a rule: their geometric mean, at least one.
+
+        It is what the likelihood pays for. A window in which a simulation runs away, as where a contact is met a moment
+        early, counts for the one that it is; in the root mean square it would count for all.
+        """
+        counts = self.peak.objective.counts
+        simulated = math.exp(-0.5 * float(counts @ np.log(self.peak.weight[0]) / counts.sum()))
+        return simulated if self.traced is None else min(simulated, self.traced.noise_scale)
+
 
 def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:
     """Cut a track into windows of every length, with blocks held out where it is long enough.

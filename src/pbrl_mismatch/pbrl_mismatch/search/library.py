@@ -80,8 +80,9 @@ def search_library(
         if min(each.noise_scale for each in begun) > RESTLESS:
             chosen = sorted({*chosen, *(k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].sticks)})
         pins = [k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].pins and may_be_pinned(longest.track)]
-        # A pin is so stiff that a path a millimetre off says nothing of it.
-        chosen = sorted({*chosen, *pins})
+        # A pin is so stiff that a path a millimetre off says nothing of it; and the first of two wheels has taken on
+        # what both do, so that along its path the second has nothing to explain.
+        chosen = sorted({*chosen, *pins, *(k for k, (name, _, base, _) in enumerate(jobs) if _another(name, base))})
         running = [(begun[k].hypothesis, begun[k].coordinates) for k in chosen]
         first = _survivors([each.hypothesis for each in begun], begun, LEADING, 0.0)
         leading = {begun[k].hypothesis.variant for k in (*first, *pins)}
@@ -128,6 +129,11 @@ def _same(name: str, base: Fitted, options: DiagnoseOptions) -> bool:
     """Tell whether an effect on a base is what some baseline is: a first wheel is no second one."""
     wheels = [kind for kind in options.baseline if "wheel" in kind or "caster" in kind]
     return name == "second_wheel" and bool(wheels) and "wheel_x" not in base.hypothesis.columns
+
+
+def _another(name: str, base: Fitted) -> bool:
+    """Tell whether an effect is one more of what a base has already."""
+    return name == "second_wheel" and "wheel_x" in base.hypothesis.columns
 
 
 def _climbed(cuts: Cuts, iterations: int, options: DiagnoseOptions, rough: bool, job: tuple[Hypothesis, Array]) -> Peak:
