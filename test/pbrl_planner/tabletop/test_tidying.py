@@ -19,6 +19,7 @@ from pbrl_planner.tabletop import (
     NextPush,
     Objective,
     TabletopSettings,
+    Teaching,
     Tidying,
     TidyingSettings,
     displaced,
@@ -130,3 +131,17 @@ def test_not_told_what_is_enough_it_is_near_the_best_that_can_be(rng: np.random.
     again = tidying(desk, model_of(desk), enough=math.nan)
     again.next(seen(desk, layout))
     assert again.enough == task.enough
+
+
+@pytest.mark.parametrize("seed", [4, 8, 10])
+def test_lessons_do_not_go_round_in_circles(seed: int) -> None:
+    # Items that came to lie side by side, or always the same push there and back, once kept lessons going for ever.
+    desk, rng = three(), np.random.default_rng(seed)
+    world, layout = model_of(desk), layout_of(desk, rng, 0.02)
+    task = Teaching(Lessons(desk, pushes_of((0.05, 0.015))))
+    while not isinstance(asked := task.next(seen(desk, layout)), Ended):
+        mean = world.of(desk.names[asked.item], asked.push).mean
+        rough = mean * (1.0 + 0.15 * rng.normal(size=3)) + rng.normal(size=3) * [0.001, 0.001, 0.01]
+        layout[asked.item] = displaced(layout[asked.item], rough)
+    assert asked.ending is Ending.TAUGHT, asked.reason
+    assert task.pushes < 300

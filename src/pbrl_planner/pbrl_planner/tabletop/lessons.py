@@ -26,6 +26,10 @@ APPROACH = 0.01
 """[m] between ball and item as a push begins."""
 
 
+LESS_ROOM = (1.0, 0.5, 0.2)
+"""Shares of the room that is kept: items that lie close together have to come apart before they can be taught."""
+
+
 class LessonSettings(Section):
     """When a push is known well enough.
 
@@ -97,14 +101,34 @@ class Lessons:
             fewest = min(self.model.of(self.desk.items[k].name, push).count for k, push in free)
             seldom = [(k, push) for k, push in free if self.model.of(self.desk.items[k].name, push).count == fewest]
             return max(seldom, key=lambda pair: self._space(layout, *pair))
-        # What is left waits for room: bring an item nearer to the middle, or whatever else has most room, first.
+        return self._making_room(layout, left)
+
+    def _making_room(self, layout: Array, left: list[tuple[int, Push]]) -> tuple[int, Push] | None:
+        """Return a push after which something that is left has room, or any of what waits: by turns that never repeat.
+
+        Always the one with most space would be the same two pushes for ever, there and back.
+        """
         wanted = {k for k, _ in left}
-        others = [
-            (k, push) for k in range(len(self.desk.items)) for push in self.pushes if self._has_room(layout, k, push)
-        ]
+        for room in (self.settings.room * share for share in LESS_ROOM):
+            others = [
+                (k, push)
+                for k in range(len(self.desk.items))
+                for push in self.pushes
+                if self._has_room(layout, k, push, room)
+            ]
+            waiting = [pair for pair in others if pair[0] in wanted]
+            if waiting:
+                break
         if not others:
             return None
-        return max(others, key=lambda pair: (pair[0] in wanted, self._space(layout, *pair)))
+        for k, push in sorted(others, key=lambda pair: -self._space(layout, *pair)):
+            then = layout.copy()
+            then[k] = self._expected(layout, k, push)
+            if any(self._has_room(then, item, each) for item, each in left):
+                return k, push
+        made = sum(self.model.of(item.name, push).count for item in self.desk.items for push in self.pushes)
+        chosen = waiting or others
+        return chosen[int(np.random.default_rng(made).integers(len(chosen)))]
 
     def learned(self, k: int, push: Push, before: Array, after: Array) -> Array:
         """Take in where an item was (3,) before a push and after it; return its displacement (3,)."""
@@ -124,8 +148,9 @@ class Lessons:
             return displaced(layout[k], np.array([0.0, 0.4 * push.travel * push.direction[1], turn]))
         return displaced(layout[k], np.append(push.travel * push.direction, 0.0))
 
-    def _has_room(self, layout: Array, k: int, push: Push) -> bool:
-        desk, room = self.desk, self.settings.room
+    def _has_room(self, layout: Array, k: int, push: Push, room: float | None = None) -> bool:
+        """Say whether an item and the ball keep so far from everything in a push [m]; None: as far as settings say."""
+        desk, room = self.desk, self.settings.room if room is None else room
         then = self._expected(layout, k, push)
         inset = np.full(2, room)
         for pose in (layout[k] + (then - layout[k]) / 2.0, then):
