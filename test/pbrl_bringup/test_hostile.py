@@ -175,7 +175,9 @@ def test_what_spreadsheets_do_to_a_table_is_read(table: str, here: Path, capsys:
         ("", "rosbag2_bagfile_information"),
         ("rosbag2_bagfile_information: {storage_identifier: mcap, relative_file_paths: 3}", "expected a list"),
         ("rosbag2_bagfile_information: {storage_identifier: mcap, relative_file_paths: [x.mcap]}", "x.mcap"),
-        ("rosbag2_bagfile_information: {storage_identifier: sqlite3}", "sqlite3"),
+        ("rosbag2_bagfile_information: {storage_identifier: parquet}", "parquet"),
+        ("rosbag2_bagfile_information: {storage_identifier: sqlite3}", "relative_file_paths"),
+        ("rosbag2_bagfile_information: {storage_identifier: sqlite3, relative_file_paths: [x.db3]}", "x.db3"),
     ],
 )
 @pytest.mark.parametrize("command", ["info", "fit", "play"])
