@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pbrl_bag.clocks import clock_notes
 from pbrl_bag.decoding import poses_in, wrench_in
 from pbrl_bag.errors import BagError
 from pbrl_bag.geometry import bodies_of_mapping, bodies_of_scene, corners
@@ -32,11 +33,20 @@ class Samples:
     Attributes:
         label: what to call the stream in errors.
         rows: (time, six or seven values) each: position and quaternion, or force and torque.
+        lags: when each was heard less its stamp [s], where that is known.
     """
 
     label: str
     source: PoseSource | WrenchSource
     rows: list[tuple[float, ...]] = field(default_factory=list)
+    lags: list[float] = field(default_factory=list)
+
+    def add(self, time: float, values: tuple[float, ...], heard: float | None) -> None:
+        """Take one sample, its time put right by what the mapping says of the clock."""
+        time += self.source.clock_offset
+        self.rows.append((time, *values))
+        if heard is not None:
+            self.lags.append(heard - time)
 
     def array(self, width: int) -> Array:
         """Return the samples as (n, width)."""
@@ -64,12 +74,13 @@ class RecordingBuilder:
             self._topics[topic] = roles_of(topic, self.mapping)
         return bool(self._topics[topic])
 
-    def add(self, topic: str, stamp_message: Any) -> None:
+    def add(self, topic: str, stamp_message: Any, heard: float | None = None) -> None:
         """Take one message; topics without a role are ignored.
 
         Args:
             topic: where it was heard.
             stamp_message: the decoded message, a real instance or any object with the same attributes.
+            heard: when it was heard [s], on one clock for all topics, if known; clocks are compared by it.
 
         Raises:
             BagError: its type or frame does not fit the topic's role.
@@ -82,9 +93,9 @@ class RecordingBuilder:
             elif role.kind == "scene":
                 self._add_scene(topic, stamp_message)
             elif isinstance(role.source, WrenchSource):
-                self._add_wrench(topic, role, role.source, stamp_message)
+                self._add_wrench(topic, role, role.source, stamp_message, heard)
             elif isinstance(role.source, PoseSource):
-                self._add_pose(topic, role, role.source, stamp_message)
+                self._add_pose(topic, role, role.source, stamp_message, heard)
 
     def samples(self, kind: Kind, name: str, label: str, source: PoseSource | WrenchSource) -> Samples:
         """Return the samples of a role, to be added to; empty at first."""
@@ -100,7 +111,7 @@ class RecordingBuilder:
             BagError: a topic is missing, a stream is malformed; the message names topic, time and field.
         """
         path = Path(path)
-        notes = list(self.notes)
+        notes = self.notes + clock_notes(self._lags())
         objects = self._poses("object_poses", notes)
         grippers = self._poses("gripper_poses", notes)
         wrenches = self._wrenches(notes)
@@ -114,12 +125,17 @@ class RecordingBuilder:
         self._check_complete(recording)
         return recording
 
+    def _lags(self) -> dict[str, list[float]]:
+        """Return when messages were heard less their stamps [s], by topic; wrenches, which are most, come first."""
+        streams = sorted(self._samples.items(), key=lambda each: (each[0][0] != "wrenches", each[0]))
+        return {samples.label: samples.lags for _, samples in streams}
+
     def _add_scene(self, topic: str, message: Any) -> None:
         if not (hasattr(message, "bodies") and hasattr(message, "room")):
             raise BagError(f"{topic}: expected pbrl_msgs/Scene, got {type(message).__name__}")
         self._scene = (bodies_of_scene(topic, message), corners(message.room))
 
-    def _add_wrench(self, topic: str, role: Role, source: WrenchSource, message: Any) -> None:
+    def _add_wrench(self, topic: str, role: Role, source: WrenchSource, message: Any, heard: float | None) -> None:
         sample = wrench_in(topic, message)
         contract = f"{role.name}_ft"
         if role.name not in self.mapping.wrenches and sample.frame != contract:
@@ -128,19 +144,19 @@ class RecordingBuilder:
                 "say in a mapping in which axes it is given"
             )
         torque = (np.nan,) * 3 if source.ignore_torque else sample.torque
-        self.samples("wrenches", role.name, topic, source).rows.append((sample.time, *sample.force, *torque))
+        self.samples("wrenches", role.name, topic, source).add(sample.time, (*sample.force, *torque), heard)
 
-    def _add_pose(self, topic: str, role: Role, source: PoseSource, message: Any) -> None:
+    def _add_pose(self, topic: str, role: Role, source: PoseSource, message: Any, heard: float | None) -> None:
         expected = source.frame or self.mapping.world
         samples = self.samples(role.kind, role.name, topic, source)
-        for sample in poses_in(topic, message, source.child_frame):
+        for sample in poses_in(topic, message, source.child_frame, source.index):
             if sample.frame != expected:
                 raise BagError(
                     f"{topic}: t = {sample.time:.6f} s: header.frame_id: expected {expected!r}, got {sample.frame!r}; "
                     "say in a mapping where that frame is (`frames`, `frame`)"
                 )
             turn = (np.nan,) * 4 if source.ignore_orientation else sample.quaternion
-            samples.rows.append((sample.time, *sample.position, *turn))
+            samples.add(sample.time, (*sample.position, *turn), heard)
 
     def _poses(self, kind: Kind, notes: list[str]) -> dict[str, PoseStream]:
         """Return the checked pose streams of one kind, in world."""

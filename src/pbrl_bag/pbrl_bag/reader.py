@@ -106,7 +106,7 @@ def _read_bag(path: Path, files: list[McapFile | ForeignBag], rules: Mapping | N
             for message in file.messages():
                 total += 1
                 if builder.wants(message.topic):
-                    builder.add(message.topic, file.decode(message))
+                    builder.add(message.topic, file.decode(message), message.log_time * 1e-9)
             continue
         wanted = []
         for message in file.messages():
@@ -115,7 +115,7 @@ def _read_bag(path: Path, files: list[McapFile | ForeignBag], rules: Mapping | N
                 wanted.append(message)
         decoder = Decoder(file)
         for message in sorted(wanted, key=lambda one: one.log_time):
-            builder.add(message.topic, decoder.decode(message))
+            builder.add(message.topic, decoder.decode(message), message.log_time * 1e-9)
         builder.notes += file.notes
     if total == 0:
         why = builder.notes[-1] if builder.notes else "it was finished without one"

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseStamped, TransformStamped, WrenchStamped
+from geometry_msgs.msg import PoseArray, PoseStamped, TransformStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
 POSE, WRENCH = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/WrenchStamped"
-ODOMETRY, TRANSFORMS = "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
+ODOMETRY, TRANSFORMS, ARRAY = "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage", "geometry_msgs/msg/PoseArray"
 CONTACT = (-0.6, 0.1)
 SECONDS, CLOSED, OPENED = 8.0, 1.0, 7.0
 Message = tuple[str, str, Any, int]
@@ -24,10 +24,12 @@ class Lab:
     """How somebody records.
 
     Attributes:
-        table, hand, wrench: topics; a table or hand on /tf is told by its frame after a "#".
+        table, hand, wrench: topics; a table or hand on /tf is told by its frame after a "#"; a number there is its
+            place in an array.
         world: frame of the poses.
         sensor: frame of the wrench.
         moved: pose (x, y, yaw) of the hand's frame of reference in `world`; its name is "robot".
+        ahead: what the clock that stamps table and hand is ahead of the sensor's [s].
     """
 
     table: str
@@ -36,6 +38,7 @@ class Lab:
     world: str = "world"
     sensor: str = "sensor"
     moved: tuple[float, float, float] | None = None
+    ahead: float = 0.0
 
 
 LABS = {
@@ -43,6 +46,8 @@ LABS = {
     "transforms": Lab("/tf#desk", "/tf#left_gripper_tool", "/ft_sensor/left", world="map", sensor="left_tool0"),
     "odometry": Lab("/cart/odom_pose", "/left_hand/pose", "/left_wrench", world="lab"),
     "other frames": Lab("/tags/crate", "/l_gripper_tcp", "/wrench", world="ceiling", moved=(1.0, -2.0, 0.7)),
+    "array": Lab("/tracker/bodies#1", "/tracker/tool_left", "/ft", world="tracker"),
+    "two clocks": Lab("/optitrack/bench/pose", "/optitrack/left_hand/pose", "/netft/left", world="opti", ahead=37.25),
     "one hand": Lab("/mocap/sofa/pose", "/mocap/gripper/pose", "/robotiq_ft_wrench", world="mocap"),
 }
 
@@ -89,9 +94,14 @@ def transform(t: float, pose: np.ndarray, parent: str, child: str) -> TFMessage:
     return TFMessage(transforms=[one])
 
 
-def _seen(topic: str, t: float, pose: np.ndarray, frame: str) -> Message:
+def _seen(topic: str, t: float, pose: np.ndarray, frame: str, ahead: float = 0.0) -> Message:
     when = round(t * 1e9)
+    t += ahead
     name, _, child = topic.partition("#")
+    if child.isdigit():
+        told = stamped(t, pose, frame)
+        others = [stamped(t, np.array([2.0 + i, 1.0, 0.0]), frame).pose for i in range(int(child))]
+        return name, ARRAY, PoseArray(header=told.header, poses=[*others, told.pose]), when
     if child:
         return name, TRANSFORMS, transform(t, pose, frame, child), when
     if "odom" in name:
@@ -116,9 +126,9 @@ def recorded(lab: Lab) -> list[Message]:
         felt.wrench.torque.z = 0.3
         messages.append((lab.wrench, WRENCH, felt, round(t * 1e9)))
         if i % 4 == 0:
-            messages.append(_seen(lab.table, t, pose_at(t), lab.world))
+            messages.append(_seen(lab.table, t, pose_at(t), lab.world, lab.ahead))
             hand = hand_at(t) if lab.moved is None else in_frame(hand_at(t), lab.moved)
-            messages.append(_seen(lab.hand, t, hand, frame))
+            messages.append(_seen(lab.hand, t, hand, frame, lab.ahead))
             messages.append(_seen("/chair/pose", t, np.array([3.0, 1.0, 0.2]), lab.world))
             messages.append(_seen("/tf#base_link", t, np.array([0.3 * t, 0.0, 0.0]), lab.world))
     return sorted(messages, key=lambda message: message[3])
