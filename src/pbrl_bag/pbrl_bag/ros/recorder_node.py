@@ -37,13 +37,12 @@ class RecorderNode(Node):
 
     def __init__(self, **options: object):
         super().__init__("recorder_node", **options)
-        default = datetime.now().strftime("recording_%Y_%m_%d-%H_%M_%S")
-        self.output = declare(self, "output", default, "bag folder to make; must not exist yet")
+        text = "bag folder to make, which must not exist yet; empty: recording_<date and time>"
+        output = declare(self, "output", "", text)
         self.topics = declare(self, "topics", [], "topics to record, * matches any text; empty: all")
         self.exclude = declare(self, "exclude", NOT_RECORDED, "topics to leave out, * matches any text")
         refuse_unknown(self)
-        if not self.output:
-            raise BagError("output: expected the name of a folder, got an empty text")
+        self.output: str = output or datetime.now().strftime("recording_%Y_%m_%d-%H_%M_%S")
         self.writer = BagWriter(self.output)
         self._heard: dict[str, tuple[Subscription, QoSProfile]] = {}
         self._refused: set[str] = set()

@@ -72,12 +72,13 @@ class PushNode(Node):
             self, "trajectory", "", "in place of a plan: name of one in config/params/trajectories, or a path"
         )
         fetch = declare(self, "fetch", False, "drive to the object first, from anywhere in the room")
-        grips = declare(self, "grips", "plan", "of a fetch: plan, as it says; sampled, as the object's model allows")
+        text = "of a fetch: plan, as it says; sampled, as the object's model allows"
+        grips = declare(self, "grips", "plan", text, choices=("plan", "sampled"))
         self._exit = declare(self, "exit_when_done", False, "end with exit code 0 when done, 1 when failed")
         rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (10.0, 200.0))
         refuse_unknown(self)
-        if grips not in ("plan", "sampled") or (grips == "sampled" and not fetch):
-            raise ControlError(f"grips: expected plan, or sampled together with fetch:=true, got {grips!r}")
+        if grips == "sampled" and not fetch:
+            raise ControlError("grips: expected plan, or sampled together with fetch:=true, got sampled alone")
         self._course: TrajectoryCourse | None = None
         self._plan, self._task = self._load(plan, trajectory)
         self._hands = tuple(side for side in SIDES if any(grip.gripper == side for grip in self._plan.grips))

@@ -74,8 +74,8 @@ class NamoNode(Node):
         super().__init__("namo_node")
         goal = declare(self, "goal", "", '"x y" or "x y theta" in world [m, rad], at once; empty: wait for one')
         rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (10.0, 200.0))
-        self._seed = declare(self, "seed", 0, "of every draw, for goals that bring none", (0, 2**31 - 1))
-        memory = declare(self, "memory", MEMORY, "of what was heard while something was held [MB]", (10.0, 4000.0))
+        self._seed = declare(self, "seed", 0, "seed of every draw, for goals that bring none", (0, 2**31 - 1))
+        memory = declare(self, "memory", MEMORY, "most that is kept of what was heard [MB]", (10.0, 4000.0))
         refuse_unknown(self)
         self._first = goal_from_text(goal) if goal else None
         self._settings = load_section(

@@ -43,7 +43,7 @@ class CostmapNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("costmap_node", **options)
         self._settings = declare_settings(self)
-        rate = declare(self, "rate", 2.0, "of the global costmap, on the node's clock [Hz]", (0.1, 20.0))
+        rate = declare(self, "rate", 2.0, "rate of the global costmap, on the node's clock [Hz]", (0.1, 20.0))
         refuse_unknown(self)
         self.tracker, self._frames = CartTracker(), Frames()
         self._static: StaticMap | None = None

@@ -74,9 +74,9 @@ class TabletopNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("tabletop_node", **options)
         camera = declare(self, "camera", "overhead_0", "overhead camera; empty: poses on /ar_tags/<item>/pose")
-        kind = declare(self, "forward_model", "tables", f"what pushes do is known as: {' or '.join(FORWARD_MODELS)}")
+        kind = declare(self, "forward_model", "tables", "what pushes do is known as", choices=FORWARD_MODELS)
         model = declare(self, "model", "", "JSON of what pushes do; read at the start, written when it was learned")
-        self._think = declare(self, "think", 2.0, "seconds for a plan", (0.05, 600.0))
+        self._think = declare(self, "think", 2.0, "time for a plan [s]", (0.05, 600.0))
         refuse_unknown(self)
         self._planning = TabletopSettings()
         self._known = Knowledge(kind, self._planning.travels, file=Path(model) if model else None)
