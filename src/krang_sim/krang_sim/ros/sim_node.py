@@ -38,8 +38,8 @@ class SimNode(PacedSimulator):
         self.session = KrangSession(scene, seed=seed, gui=gui)
         self.start(self.session, message_types(self.session.tagged, self.session.cameras))
         self.obey_arms(self.session)
-        self.listen(Twist, "/cmd_vel", lambda message: self.session.command_base(message.linear.x, message.angular.z))
-        self.listen(Float64MultiArray, "/body_velocity_controller/commands", self._command_body)
+        self.listen(Twist, "cmd_vel", lambda message: self.session.command_base(message.linear.x, message.angular.z))
+        self.listen(Float64MultiArray, "body_velocity_controller/commands", self._command_body)
 
     def _declare(self) -> tuple[Scene, int, bool]:
         """Declare every parameter; return scene, seed and gui."""

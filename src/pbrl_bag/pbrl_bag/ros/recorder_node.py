@@ -16,6 +16,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from pbrl_bag.errors import BagError
+from pbrl_bag.names import GLOBAL, canonical
 from pbrl_bag.qos import Qos
 from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
 from pbrl_bag.ros.parameters import declare, refuse_unknown
@@ -28,6 +29,9 @@ NOT_RECORDED = ["/parameter_events"]
 
 class RecorderNode(Node):
     """Subscribes to every topic that is asked for, as soon as somebody publishes it.
+
+    In a namespace that is what lies in it, and clock and transforms as they are remapped for it. Names stay as they
+    are on the wire; patterns are of names as in the root namespace.
 
     Log time is the time of arrival: wall time, or the time of `/clock` under use_sim_time.
 
@@ -46,6 +50,7 @@ class RecorderNode(Node):
         self.writer = BagWriter(self.output)
         self._heard: dict[str, tuple[Subscription, QoSProfile]] = {}
         self._refused: set[str] = set()
+        self._global = {self.resolve_topic_name(name) for name in GLOBAL}
         self._sim_time = bool(self.get_parameter("use_sim_time").value)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DISCOVERY_SECONDS, self.discover, clock=self._steady)
@@ -53,7 +58,11 @@ class RecorderNode(Node):
         self.get_logger().info(f"recording into {self.output}")
 
     def wants(self, topic: str) -> bool:
-        """Tell whether a topic is to be recorded."""
+        """Tell whether a topic is to be recorded, by its name on the wire."""
+        own = canonical(topic, self.get_namespace())
+        if own is None and topic not in self._global:
+            return False
+        topic = own or topic
         if any(fnmatch.fnmatchcase(topic, pattern) for pattern in self.exclude):
             return False
         return not self.topics or any(fnmatch.fnmatchcase(topic, pattern) for pattern in self.topics)

@@ -64,8 +64,8 @@ class MismatchNode(Node):
         memory = declare(self, "memory", MEMORY, "most that is kept of messages for a diagnosis [MB]", (1.0, 100_000.0))
         refuse_unknown(self)
         chosen = DiagnoseOptions(without=tuple(without), workers=workers, seed=seed)
-        self._mismatches = self.create_publisher(Mismatches, "/mismatches", LATCHED)
-        self.listener = RecordingListener("mismatch_node_listener", context, memory)
+        self._mismatches = self.create_publisher(Mismatches, "mismatches", LATCHED)
+        self.listener = RecordingListener("mismatch_node_listener", context, memory, self.get_namespace())
         self._watcher = Watcher(
             MismatchMonitor(monitor),
             self.listener,
@@ -74,10 +74,10 @@ class MismatchNode(Node):
             self.get_logger().warning,
             period,
         )
-        self.create_subscription(ObjectModels, "/object_models", self._take_models, LATCHED)
+        self.create_subscription(ObjectModels, "object_models", self._take_models, LATCHED)
         # In a group of its own: the answer comes while whoever asked for the experiment is still waiting.
-        self._pusher = self.create_client(PushObject, "/push", callback_group=ReentrantCallbackGroup())
-        self.create_service(Trigger, "/run_next_experiment", self._run_next_experiment)
+        self._pusher = self.create_client(PushObject, "push", callback_group=ReentrantCallbackGroup())
+        self.create_service(Trigger, "run_next_experiment", self._run_next_experiment)
         self._watcher.start()
         self.listener.start()
 

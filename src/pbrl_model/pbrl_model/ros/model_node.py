@@ -75,10 +75,10 @@ class ModelNode(Node):
         self._lock = threading.Lock()
         self._stamp = 0.0
         self._published = 0
-        self._models = self.create_publisher(ObjectModels, "/object_models", LATCHED)
-        self._markers = self.create_publisher(MarkerArray, "/object_models/markers", QoSProfile(depth=1))
-        self.listener = RecordingListener("model_node_listener", context, memory)
-        self.create_service(LearnModel, "/learn", self._learn)
+        self._models = self.create_publisher(ObjectModels, "object_models", LATCHED)
+        self._markers = self.create_publisher(MarkerArray, "object_models/markers", QoSProfile(depth=1))
+        self.listener = RecordingListener("model_node_listener", context, memory, self.get_namespace())
+        self.create_service(LearnModel, "learn", self._learn)
         self.create_timer(MARKER_SECONDS, self._draw, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._serve(stored)
         self._worker = self._start_learning(stored, period) if online else None

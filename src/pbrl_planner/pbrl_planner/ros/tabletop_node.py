@@ -50,7 +50,7 @@ TICK = 0.01
 """[s] of the node's clock."""
 SILENT = 2.0
 """Without the arm's joints for so long [s] nothing is moved any more."""
-OUTPUT = "/ball_arm_position_controller/commands"
+OUTPUT = "ball_arm_position_controller/commands"
 
 
 @dataclass
@@ -86,12 +86,12 @@ class TabletopNode(Node):
         self._executive: DeskExecutive | None = None
         self._hearing = DeskHearing(self, camera, self._on_look)
         self._arm = self.create_publisher(Float64MultiArray, OUTPUT, COMMANDS)
-        self._drawing = self.create_publisher(MarkerArray, "/markers", COMMANDS)
+        self._drawing = self.create_publisher(MarkerArray, "markers", COMMANDS)
         self._goals = OneGoal(
-            self, Tidy, "/tidy", self._on_goal, self._cancel, lambda why: Tidy.Result(message=why, cost=math.nan)
+            self, Tidy, "tidy", self._on_goal, self._cancel, lambda why: Tidy.Result(message=why, cost=math.nan)
         )
         self.create_timer(TICK, self._tick)
-        self._say = Saying(self, "/tabletop/status", "waits for a goal on /tidy")
+        self._say = Saying(self, "tabletop/status", "waits for a goal on /tidy")
 
     @property
     def thinking(self) -> bool:

@@ -38,9 +38,9 @@ class SimNode(PacedSimulator):
         self.session = Pr2Session(scene, seed=seed, gui=gui)
         self.start(self.session, MESSAGE_TYPES, LATCHED)
         self.obey_arms(self.session)
-        self.listen(Twist, "/cmd_vel", self._command_base)
-        self.listen(Float64MultiArray, "/torso_velocity_controller/commands", self._command_torso)
-        self.listen(Float64MultiArray, "/head_velocity_controller/commands", self._command_head)
+        self.listen(Twist, "cmd_vel", self._command_base)
+        self.listen(Float64MultiArray, "torso_velocity_controller/commands", self._command_torso)
+        self.listen(Float64MultiArray, "head_velocity_controller/commands", self._command_head)
 
     def _declare(self) -> tuple[OfficeScene, int, bool]:
         """Declare every parameter; return scene, seed and gui."""

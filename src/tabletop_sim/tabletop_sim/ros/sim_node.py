@@ -18,7 +18,7 @@ from tabletop_sim.messages import LATCHED, message_types
 from tabletop_sim.scene import DeskScene, Vision, load_desk
 from tabletop_sim.session import DeskSession
 
-COMMANDS = "/ball_arm_position_controller/commands"
+COMMANDS = "ball_arm_position_controller/commands"
 
 
 class SimNode(PacedSimulator):
