@@ -16,6 +16,7 @@ from pbrl_bag.foreign_bag import ForeignBag, is_foreign
 from pbrl_bag.mapping import Mapping, load_mapping
 from pbrl_bag.mcap_file import McapFile, RawMessage
 from pbrl_bag.metadata import files_of_bag
+from pbrl_bag.names import canonical, namespace_of
 from pbrl_bag.types import Recording
 
 
@@ -23,7 +24,7 @@ def read_recording(path: Path | str, mapping: Path | str | None = None) -> Recor
     """Read a recording.
 
     A file that a crash cut short is read up to its last finished chunk; `Recording.notes` says how
-    much was lost.
+    much was lost. Topics of one robot in a namespace count as those of the contract, and a note says so.
 
     Args:
         path: a bag folder (MCAP or SQLite), an .mcap, .db3 or .bag (ROS 1) file, or a .csv file.
@@ -36,7 +37,7 @@ def read_recording(path: Path | str, mapping: Path | str | None = None) -> Recor
     rules = None if mapping is None else load_mapping(mapping)
     files = files_of(path)
     if path.suffix.lower() != ".csv":
-        return _read_bag(path, [opened(file) for file in files], rules)
+        return _read_bag(path, files, rules)
     if rules is None:
         raise BagError(f"{path}: a CSV file needs a mapping that names its columns; see config/mappings/")
     return read_csv(path, rules)
@@ -97,27 +98,37 @@ class Decoder:
         return decoder
 
 
-def _read_bag(path: Path, files: list[McapFile | ForeignBag], rules: Mapping | None) -> Recording:
-    """Read the messages that play a role, in the order in which they were heard."""
-    builder = RecordingBuilder(rules)
-    total = 0
-    for file in files:
-        if isinstance(file, ForeignBag):  # in order already, and decoded while it is open
-            for message in file.messages():
-                total += 1
-                if builder.wants(message.topic):
-                    builder.add(message.topic, file.decode(message), message.log_time * 1e-9)
-            continue
-        wanted = []
-        for message in file.messages():
-            total += 1
-            if builder.wants(message.topic):
-                wanted.append(message)
-        decoder = Decoder(file)
-        for message in sorted(wanted, key=lambda one: one.log_time):
-            builder.add(message.topic, decoder.decode(message), message.log_time * 1e-9)
-        builder.notes += file.notes
-    if total == 0:
+def _read_bag(path: Path, files: tuple[Path, ...], rules: Mapping | None) -> Recording:
+    """Read the messages that play a role; those of a robot in a namespace where there is none in the root."""
+    builder, topics = _collected(files, rules, "")
+    if not topics:
         why = builder.notes[-1] if builder.notes else "it was finished without one"
         raise BagError(f"{path}: expected messages, got none: {why}")
+    namespace = "" if rules is not None else namespace_of(topics, str(path))
+    if namespace:
+        builder, _ = _collected(files, rules, namespace)
+        builder.notes.append(f"the robot's namespace {namespace} is left out of the names of its topics")
     return builder.build(path)
+
+
+def _collected(files: tuple[Path, ...], rules: Mapping | None, namespace: str) -> tuple[RecordingBuilder, set[str]]:
+    """Return the messages of a namespace that play a role, in the order in which they were heard; and all topics."""
+    builder, topics = RecordingBuilder(rules), set[str]()
+
+    def role(message: RawMessage) -> str | None:
+        topics.add(message.topic)
+        name = canonical(message.topic, namespace)
+        return name if name is not None and builder.wants(name) else None
+
+    for file in map(opened, files):
+        if isinstance(file, ForeignBag):  # in order already, and decoded while it is open
+            for message in file.messages():
+                if name := role(message):
+                    builder.add(name, file.decode(message), message.log_time * 1e-9)
+            continue
+        wanted = [(name, message) for message in file.messages() if (name := role(message))]
+        decoder = Decoder(file)
+        for name, message in sorted(wanted, key=lambda one: one[1].log_time):
+            builder.add(name, decoder.decode(message), message.log_time * 1e-9)
+        builder.notes += file.notes
+    return builder, topics

@@ -18,7 +18,7 @@ from typing import Annotated, Any
 import typer
 from typer.exceptions import TyperException
 
-from pbrl_bringup.cli_options import Bag, Domain, Engine, Likelihood, Many, Mapping, Out, Sampler, Seed
+from pbrl_bringup.cli_options import Bag, Domain, Engine, Likelihood, Many, Mapping, Namespace, Out, Sampler, Seed
 
 # Errors whose message is for the person at the keyboard. Named, not imported: an error can only have
 # been raised by a module that is loaded, and loading all of them would slow every start.
@@ -176,31 +176,35 @@ def run(
     graph: Annotated[str, typer.Argument(help="Graph file, or a name in config/params/graphs.")],
     set_: Annotated[list[str] | None, typer.Option("--set", help="NODE.PARAMETER=VALUE, as often as needed.")] = None,
     with_: Annotated[list[str] | None, typer.Option("--with", help="An optional node to start too.")] = None,
+    namespace: Namespace = "",
     domain: Domain = None,
     logs: Annotated[Path, typer.Option(help="Folder for the nodes' output.")] = Path("out/logs"),
 ) -> int:
     """Start a graph of nodes and keep it until Ctrl-C."""
-    return _hand_over("run", graph=graph, settings=set_ or [], optional=with_ or [], domain=domain, logs=logs)
+    chosen = {"settings": set_ or [], "optional": with_ or [], "namespace": namespace}
+    return _hand_over("run", graph=graph, **chosen, domain=domain, logs=logs)
 
 
 @app.command(epilog="Example: ./pbrl record --out out/push.bag")
 def record(
     out: Annotated[Path, typer.Option(help="Bag folder to make; it must not exist yet.")],
     duration: Annotated[float, typer.Option(min=0, max=1e9, help="Seconds to record; 0: until Ctrl-C.")] = 0.0,
+    namespace: Namespace = "",
     domain: Domain = None,
 ) -> int:
-    """Record the contract's topics of a running graph or robot."""
-    return _hand_over("record", out=out, duration=duration, domain=domain)
+    """Record the topics of a running graph or robot."""
+    return _hand_over("record", out=out, duration=duration, namespace=namespace, domain=domain)
 
 
 @app.command(epilog="Example: ./pbrl play out/push.bag --rate 2")
 def play(
     bag: Annotated[Path, typer.Argument(help="Bag folder or .mcap file.")],
     rate: Annotated[float, typer.Option(min=0.01, max=1000, help="Times faster than it was recorded.")] = 1.0,
+    namespace: Namespace = "",
     domain: Domain = None,
 ) -> int:
     """Publish a recording again."""
-    return _hand_over("play", bag=bag, rate=rate, domain=domain)
+    return _hand_over("play", bag=bag, rate=rate, namespace=namespace, domain=domain)
 
 
 @app.command(epilog="Example: ./pbrl info out/push.bag")

@@ -38,4 +38,7 @@ Mapping = Annotated[
     Path | None, typer.Option("--map", help="Which topic or column plays which role in a foreign file.")
 ]
 Domain = Annotated[int | None, typer.Option(min=0, max=101, help="ROS_DOMAIN_ID; by default the environment's own.")]
+Namespace = Annotated[
+    str, typer.Option(help="Of the robot, such as robot_1: several can share a domain. Default: none, the root.")
+]
 Many = {"allow_extra_args": True, "ignore_unknown_options": True}
