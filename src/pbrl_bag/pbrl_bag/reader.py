@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from collections.abc import Mapping as MappingType
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mcap.records import Channel
 from mcap_ros2.decoder import DecoderFactory
 
+from pbrl_bag.batches import batch_of
 from pbrl_bag.builder import RecordingBuilder
 from pbrl_bag.csv_reader import read_csv
 from pbrl_bag.errors import BagError
@@ -18,8 +21,17 @@ from pbrl_bag.mcap_file import McapFile, RawMessage
 from pbrl_bag.metadata import files_of_bag
 from pbrl_bag.types import Recording
 
+Hearers = MappingType[str, Callable[[Any], None]]
+"""What takes the decoded messages of a topic, by topic."""
 
-def read_recording(path: Path | str, mapping: Path | str | None = None) -> Recording:
+
+def read_recording(
+    path: Path | str,
+    mapping: Path | str | None = None,
+    *,
+    complete: bool = True,
+    also: Hearers | None = None,
+) -> Recording:
     """Read a recording.
 
     A file that a crash cut short is read up to its last finished chunk; `Recording.notes` says how
@@ -28,6 +40,8 @@ def read_recording(path: Path | str, mapping: Path | str | None = None) -> Recor
     Args:
         path: a bag folder (MCAP or SQLite), an .mcap, .db3 or .bag (ROS 1) file, or a .csv file.
         mapping: a mapping file; needed for CSV and for bags whose topics are not the contract's.
+        complete: whether what is needed to learn from it has to be there; see `RecordingBuilder.build`.
+        also: topics beside those of a recording, and what takes each message of theirs, in order.
 
     Raises:
         BagError: anything missing or malformed, in one line that names file, topic, time and field.
@@ -36,7 +50,7 @@ def read_recording(path: Path | str, mapping: Path | str | None = None) -> Recor
     rules = None if mapping is None else load_mapping(mapping)
     files = files_of(path)
     if path.suffix.lower() != ".csv":
-        return _read_bag(path, [opened(file) for file in files], rules)
+        return _read_bag(path, [opened(file) for file in files], rules, complete, also or {})
     if rules is None:
         raise BagError(f"{path}: a CSV file needs a mapping that names its columns; see config/mappings/")
     return read_csv(path, rules)
@@ -97,7 +111,9 @@ class Decoder:
         return decoder
 
 
-def _read_bag(path: Path, files: list[McapFile | ForeignBag], rules: Mapping | None) -> Recording:
+def _read_bag(
+    path: Path, files: list[McapFile | ForeignBag], rules: Mapping | None, complete: bool, also: Hearers
+) -> Recording:
     """Read the messages that play a role, in the order in which they were heard."""
     builder = RecordingBuilder(rules)
     total = 0
@@ -105,19 +121,54 @@ def _read_bag(path: Path, files: list[McapFile | ForeignBag], rules: Mapping | N
         if isinstance(file, ForeignBag):  # in order already, and decoded while it is open
             for message in file.messages():
                 total += 1
-                if builder.wants(message.topic):
-                    builder.add(message.topic, file.decode(message))
+                if builder.wants(message.topic) or message.topic in also:
+                    _give(builder, also, message.topic, file.decode(message))
             continue
-        wanted = []
+        wanted: dict[str, list[RawMessage]] = {}
         for message in file.messages():
             total += 1
-            if builder.wants(message.topic):
-                wanted.append(message)
+            if builder.wants(message.topic) or message.topic in also:
+                wanted.setdefault(message.topic, []).append(message)
         decoder = Decoder(file)
-        for message in sorted(wanted, key=lambda one: one.log_time):
-            builder.add(message.topic, decoder.decode(message))
+        left: list[RawMessage] = []
+        for messages in wanted.values():
+            if not _taken_together(builder, decoder, messages, also):
+                left += messages
+        for message in sorted(left, key=lambda one: one.log_time):
+            _give(builder, also, message.topic, decoder.decode(message))
         builder.notes += file.notes
     if total == 0:
         why = builder.notes[-1] if builder.notes else "it was finished without one"
         raise BagError(f"{path}: expected messages, got none: {why}")
-    return builder.build(path)
+    return builder.build(path, complete=complete)
+
+
+def _give(builder: RecordingBuilder, also: Hearers, topic: str, message: Any) -> None:
+    builder.add(topic, message)
+    if topic in also:
+        also[topic](message)
+
+
+def _taken_together(builder: RecordingBuilder, decoder: Decoder, messages: list[RawMessage], also: Hearers) -> bool:
+    """Give the messages of one topic to the builder in one go, or return False where that cannot be done."""
+    messages.sort(key=lambda one: one.log_time)
+    topic, several = messages[0].topic, len({one.channel for one in messages}) > 1
+    batch = None if several or topic in also else batch_of(messages[0].type, [one.data for one in messages])
+    if batch is None or not builder.takes(topic, batch):
+        return False
+    for k in (0, len(messages) // 2, -1):  # a stranger's type of that name can have its fields in another order
+        if not np.array_equal(batch.values[k], _numbers(decoder.decode(messages[k])), equal_nan=True):
+            return False
+    builder.add_batch(topic, batch)
+    return True
+
+
+def _numbers(message: Any) -> list[float]:
+    """Return the numbers of a stamped pose or wrench as a batch has them; none of anything else."""
+    if hasattr(message, "pose"):
+        at, turn = message.pose.position, message.pose.orientation
+        return [at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w]
+    if hasattr(message, "wrench"):
+        force, torque = message.wrench.force, message.wrench.torque
+        return [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+    return []
