@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pbrl_bag.batches import Batch
 from pbrl_bag.clocks import clock_notes
 from pbrl_bag.decoding import poses_in, wrench_in
 from pbrl_bag.errors import BagError
@@ -17,6 +17,7 @@ from pbrl_bag.geometry import bodies_of_mapping, bodies_of_scene, corners
 from pbrl_bag.grasps import GraspChange, change_in, grasps_from_changes, grasps_from_mapping
 from pbrl_bag.mapping import FramePose, Mapping, PoseSource, WrenchSource
 from pbrl_bag.roles import CONTRACT, Kind, Role, roles_of, topic_of
+from pbrl_bag.samples import Samples
 from pbrl_bag.streams import Limits, pose_stream, read_only, wrench_stream
 from pbrl_bag.types import Array, BodyGeometry, Grasp, PoseStream, Recording, WrenchStream
 from pbrl_bag.validation import nearest
@@ -24,33 +25,6 @@ from pbrl_bag.validation import nearest
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 NEWTONS = {"N": 1.0, "lbf": 4.4482216152605, "kgf": 9.80665}
 NEWTON_METRES = {"N m": 1.0, "lbf in": 0.1129848290276167}
-
-
-@dataclass
-class Samples:
-    """What one stream has brought so far, in the units and the frame it came in.
-
-    Attributes:
-        label: what to call the stream in errors.
-        rows: (time, six or seven values) each: position and quaternion, or force and torque.
-        lags: when each was heard less its stamp [s], where that is known.
-    """
-
-    label: str
-    source: PoseSource | WrenchSource
-    rows: list[tuple[float, ...]] = field(default_factory=list)
-    lags: list[float] = field(default_factory=list)
-
-    def add(self, time: float, values: tuple[float, ...], heard: float | None) -> None:
-        """Take one sample, its time put right by what the mapping says of the clock."""
-        time += self.source.clock_offset
-        self.rows.append((time, *values))
-        if heard is not None:
-            self.lags.append(heard - time)
-
-    def array(self, width: int) -> Array:
-        """Return the samples as (n, width)."""
-        return np.array(self.rows, dtype=np.float64).reshape(-1, width)
 
 
 class RecordingBuilder:
@@ -97,15 +71,43 @@ class RecordingBuilder:
             elif isinstance(role.source, PoseSource):
                 self._add_pose(topic, role, role.source, stamp_message, heard)
 
+    def takes(self, topic: str, batch: Batch) -> bool:
+        """Tell whether a batch of a topic is what every role of the topic is filled with."""
+        expected = PoseSource if batch.kind == "pose" else WrenchSource
+        return self.wants(topic) and all(isinstance(role.source, expected) for role in self._topics[topic])
+
+    def add_batch(self, topic: str, batch: Batch, heard: Array | None = None) -> None:
+        """Take many messages that `takes` says yes to, heard at times (n,) [s]; the same as `add` one by one.
+
+        Raises:
+            BagError: their frame does not fit the topic's role.
+        """
+        first = float(batch.time[0])
+        for role in self._topics[topic]:
+            values = batch.values.copy()
+            if isinstance(role.source, WrenchSource):
+                self._check_wrench_frame(topic, role, first, batch.frame)
+                if role.source.ignore_torque:
+                    values[:, 3:] = np.nan
+                samples = self.samples("wrenches", role.name, topic, role.source)
+            elif isinstance(role.source, PoseSource):
+                self._check_pose_frame(topic, role.source, first, batch.frame)
+                if role.source.ignore_orientation:
+                    values[:, 3:] = np.nan
+                samples = self.samples(role.kind, role.name, topic, role.source)
+            samples.extend(np.column_stack([batch.time, values]), heard)
+
     def samples(self, kind: Kind, name: str, label: str, source: PoseSource | WrenchSource) -> Samples:
         """Return the samples of a role, to be added to; empty at first."""
         return self._samples.setdefault((kind, name), Samples(label, source))
 
-    def build(self, path: Path | str = "") -> Recording:
+    def build(self, path: Path | str = "", *, complete: bool = True) -> Recording:
         """Check what was collected and return it as a Recording.
 
         Args:
             path: where it came from, for errors and for `Recording.path`.
+            complete: whether everything has to be there that is needed to learn from it. Otherwise what is missing
+                is told in `Recording.notes`, and one stream or one body is enough.
 
         Raises:
             BagError: a topic is missing, a stream is malformed; the message names topic, time and field.
@@ -116,19 +118,33 @@ class RecordingBuilder:
         grippers = self._poses("gripper_poses", notes)
         wrenches = self._wrenches(notes)
         streams: list[PoseStream | WrenchStream] = [*objects.values(), *grippers.values(), *wrenches.values()]
-        start, end = self._span(path, streams)
-        bodies, room = self._geometry(path, objects)
-        grasps = self._grasps(path, start, end)
+        if not complete:
+            notes += self._left_out(objects, wrenches)
+        start, end = self._span(path, streams, complete=complete)
+        bodies, room = self._geometry(path, objects, complete=complete)
+        grasps = self._grasps(path, start, end, complete=complete)
         for name in sorted(set(objects) - set(bodies)):
             notes.append(f"body {name!r} is seen but has no geometry: it cannot be learned about")
         recording = Recording(path, bodies, objects, grippers, wrenches, grasps, room, tuple(notes))
-        self._check_complete(recording)
+        if complete:
+            self._check_complete(recording)
         return recording
 
-    def _lags(self) -> dict[str, list[float]]:
+    def _lags(self) -> dict[str, Array]:
         """Return when messages were heard less their stamps [s], by topic; wrenches, which are most, come first."""
         streams = sorted(self._samples.items(), key=lambda each: (each[0][0] != "wrenches", each[0]))
-        return {samples.label: samples.lags for _, samples in streams}
+        return {samples.label: np.concatenate([np.empty(0), *samples.lags]) for _, samples in streams}
+
+    def _left_out(self, objects: dict[str, PoseStream], wrenches: dict[str, WrenchStream]) -> list[str]:
+        """Say which kinds of what a recording is made of are missing."""
+        geometry = bool(self._scene or self.mapping.bodies)
+        there = {
+            "pose of an object": bool(objects),
+            "wrench": bool(wrenches),
+            "geometry of a body": geometry,
+            "word on who holds what": bool(self._changes or self.mapping.grasps),
+        }
+        return [f"there is no {what} in it" for what, known in there.items() if not known]
 
     def _add_scene(self, topic: str, message: Any) -> None:
         if not (hasattr(message, "bodies") and hasattr(message, "room")):
@@ -137,33 +153,39 @@ class RecordingBuilder:
 
     def _add_wrench(self, topic: str, role: Role, source: WrenchSource, message: Any, heard: float | None) -> None:
         sample = wrench_in(topic, message)
-        contract = f"{role.name}_ft"
-        if role.name not in self.mapping.wrenches and sample.frame != contract:
-            raise BagError(
-                f"{topic}: t = {sample.time:.6f} s: header.frame_id: expected {contract!r}, got {sample.frame!r}; "
-                "say in a mapping in which axes it is given"
-            )
+        self._check_wrench_frame(topic, role, sample.time, sample.frame)
         torque = (np.nan,) * 3 if source.ignore_torque else sample.torque
         self.samples("wrenches", role.name, topic, source).add(sample.time, (*sample.force, *torque), heard)
 
+    def _check_wrench_frame(self, topic: str, role: Role, time: float, frame: str) -> None:
+        contract = f"{role.name}_ft"
+        if role.name not in self.mapping.wrenches and frame != contract:
+            raise BagError(
+                f"{topic}: t = {time:.6f} s: header.frame_id: expected {contract!r}, got {frame!r}; "
+                "say in a mapping in which axes it is given"
+            )
+
     def _add_pose(self, topic: str, role: Role, source: PoseSource, message: Any, heard: float | None) -> None:
-        expected = source.frame or self.mapping.world
         samples = self.samples(role.kind, role.name, topic, source)
         for sample in poses_in(topic, message, source.child_frame, source.index):
-            if sample.frame != expected:
-                raise BagError(
-                    f"{topic}: t = {sample.time:.6f} s: header.frame_id: expected {expected!r}, got {sample.frame!r}; "
-                    "say in a mapping where that frame is (`frames`, `frame`)"
-                )
+            self._check_pose_frame(topic, source, sample.time, sample.frame)
             turn = (np.nan,) * 4 if source.ignore_orientation else sample.quaternion
             samples.add(sample.time, (*sample.position, *turn), heard)
+
+    def _check_pose_frame(self, topic: str, source: PoseSource, time: float, frame: str) -> None:
+        expected = source.frame or self.mapping.world
+        if frame != expected:
+            raise BagError(
+                f"{topic}: t = {time:.6f} s: header.frame_id: expected {expected!r}, got {frame!r}; "
+                "say in a mapping where that frame is (`frames`, `frame`)"
+            )
 
     def _poses(self, kind: Kind, notes: list[str]) -> dict[str, PoseStream]:
         """Return the checked pose streams of one kind, in world."""
         limits = Limits(self.mapping.max_speed, self.mapping.max_turn_rate)
         streams = {}
         for (found, name), samples in sorted(self._samples.items()):
-            if found == kind and samples.rows and isinstance(samples.source, PoseSource):
+            if found == kind and len(samples) and isinstance(samples.source, PoseSource):
                 rows = samples.array(8)
                 position, quaternion = self._to_world(rows[:, 1:4], rows[:, 4:8], samples)
                 streams[name] = pose_stream(samples.label, rows[:, 0], position, quaternion, limits, notes)
@@ -186,7 +208,7 @@ class RecordingBuilder:
         streams = {}
         for (kind, name), samples in sorted(self._samples.items()):
             source = samples.source
-            if kind != "wrenches" or not samples.rows or not isinstance(source, WrenchSource):
+            if kind != "wrenches" or not len(samples) or not isinstance(source, WrenchSource):
                 continue
             rows = samples.array(7)
             force = rows[:, 1:4] * (source.sign * NEWTONS[source.unit])
@@ -198,8 +220,10 @@ class RecordingBuilder:
             streams[name] = wrench_stream(samples.label, rows[:, 0], force, torque, source.exerted_on, axes, notes)
         return streams
 
-    def _span(self, path: Path, streams: Sequence[PoseStream | WrenchStream]) -> tuple[float, float]:
+    def _span(self, path: Path, streams: Sequence[PoseStream | WrenchStream], *, complete: bool) -> tuple[float, float]:
         """Return times of the first and last sample [s]."""
+        if not streams and not complete and (self._scene or self.mapping.bodies):
+            return (self._changes[0].time, self._changes[-1].time) if self._changes else (0.0, 0.0)
         if not streams:
             raise self._missing(path, "object_poses", next(iter(self.mapping.object_poses), "<object>"))
         return (
@@ -207,20 +231,22 @@ class RecordingBuilder:
             max([float(stream.time[-1]) for stream in streams] + [change.time for change in self._changes[-1:]]),
         )
 
-    def _geometry(self, path: Path, poses: dict[str, PoseStream]) -> tuple[dict[str, BodyGeometry], Array]:
+    def _geometry(
+        self, path: Path, poses: dict[str, PoseStream], *, complete: bool
+    ) -> tuple[dict[str, BodyGeometry], Array]:
         """Return bodies and room; what the mapping says goes before what /scene says."""
         bodies, room = self._scene or ({}, read_only(np.empty((0, 2))))
         bodies = bodies | bodies_of_mapping(self.mapping.bodies, poses, str(path))
-        if not bodies:
+        if not bodies and complete:
             raise self._missing(path, "scene", "")
         return bodies, read_only(np.array(self.mapping.room)) if self.mapping.room else room
 
-    def _grasps(self, path: Path, start: float, end: float) -> tuple[Grasp, ...]:
+    def _grasps(self, path: Path, start: float, end: float, *, complete: bool) -> tuple[Grasp, ...]:
         """Return who held what, when."""
         topic = topic_of("grasps", "", self.mapping)
         if self.mapping.grasps:
             return grasps_from_mapping(self.mapping.grasps, start, end)
-        if not self._changes:
+        if not self._changes and complete:
             raise self._missing(path, "grasps", "")
         return grasps_from_changes(topic, self._changes, end)
 

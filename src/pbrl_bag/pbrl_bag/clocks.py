@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from pbrl_bag.types import Array
+
 LEAST = 0.1
 """Stamps that lie closer together than this [s] may be of one clock: messages take so long on their way."""
 STEADY = 0.25
@@ -16,7 +18,7 @@ FEW = 10
 """Messages that a stream needs to be judged by."""
 
 
-def clock_offsets(lags: Mapping[str, Sequence[float]]) -> dict[str, float]:
+def clock_offsets(lags: Mapping[str, Sequence[float] | Array]) -> dict[str, float]:
     """Return what has to be added to the stamps of streams whose clock is not that of the others [s].
 
     A message cannot be heard before it is stamped, and the least it takes is about the same for all: what the earliest
@@ -40,7 +42,7 @@ def clock_offsets(lags: Mapping[str, Sequence[float]]) -> dict[str, float]:
     return found
 
 
-def clock_notes(lags: Mapping[str, Sequence[float]]) -> list[str]:
+def clock_notes(lags: Mapping[str, Sequence[float] | Array]) -> list[str]:
     """Return a sentence for each stream whose stamps are not of the first one's clock.
 
     Args:

@@ -140,7 +140,7 @@ class McapFile:
             yield self._message(body)
         elif opcode == CHUNK_OPCODE:
             data = _uncompressed(Chunk.read(_stream(body)))
-            messages = [message for inner, part in _records(data) for message in self._record(inner, part)]
+            messages = self._messages_of(data)
             self.chunks += 1
             yield from messages
         elif opcode == Opcode.SCHEMA:
@@ -152,32 +152,45 @@ class McapFile:
         elif opcode == Opcode.HEADER:
             self.header = Header.read(_stream(body))
 
+    def _messages_of(self, data: bytes) -> list[RawMessage]:
+        """Return the messages of a chunk. There are hundreds of thousands in a recording: no call for each of them."""
+        found: list[RawMessage] = []
+        named: dict[int, tuple[str, str]] = {}
+        at = 0
+        while at < len(data):
+            opcode, length = _RECORD.unpack_from(data, at)
+            begin = at + _RECORD.size
+            at = begin + length
+            if at > len(data):
+                raise ValueError("a record runs past the end of its chunk")
+            if opcode != MESSAGE_OPCODE:
+                found += self._record(opcode, data[begin:at])
+                continue
+            if length < _MESSAGE.size:
+                raise ValueError(f"a message of {length} bytes")
+            channel, _, log_time, publish_time = _MESSAGE.unpack_from(data, begin)
+            if channel not in named:
+                named[channel] = self._named(channel)
+            topic, kind = named[channel]
+            found.append(RawMessage(topic, kind, log_time, publish_time, data[begin + _MESSAGE.size : at], channel))
+        return found
+
     def _message(self, body: bytes) -> RawMessage:
         """Read one message record."""
-        channel_id, _, log_time, publish_time = _MESSAGE.unpack_from(body)
+        channel, _, log_time, publish_time = _MESSAGE.unpack_from(body)
+        return RawMessage(*self._named(channel), log_time, publish_time, body[_MESSAGE.size :], channel)
+
+    def _named(self, channel_id: int) -> tuple[str, str]:
+        """Return topic and type of a channel."""
         channel = self.channels.get(channel_id)
         if channel is None:
             raise ValueError(f"message of channel {channel_id}, which nothing describes")
-        return RawMessage(
-            channel.topic, self.type_of(channel), log_time, publish_time, body[_MESSAGE.size :], channel_id
-        )
+        return channel.topic, self.type_of(channel)
 
 
 def _stream(body: bytes) -> ReadDataStream:
     """Wrap bytes for mcap's record readers."""
     return ReadDataStream(io.BytesIO(body))
-
-
-def _records(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield (opcode, body) of the records in a chunk."""
-    at = 0
-    while at < len(data):
-        opcode, length = _RECORD.unpack_from(data, at)
-        at += _RECORD.size
-        if at + length > len(data):
-            raise ValueError("a record runs past the end of its chunk")
-        yield opcode, data[at : at + length]
-        at += length
 
 
 def _uncompressed(chunk: Chunk) -> bytes:
