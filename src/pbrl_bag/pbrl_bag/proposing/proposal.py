@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from pbrl_bag.errors import BagError
 from pbrl_bag.mapping import FramePose, GraspSource, Mapping, PoseSource, WrenchSource
 from pbrl_bag.proposing.candidates import Candidates, PoseCandidate, WrenchCandidate, candidates_of
-from pbrl_bag.proposing.holding import Held, extent, held
+from pbrl_bag.proposing.holding import Held, extent, held, while_felt
 from pbrl_bag.roles import CONTRACT, roles_of
 from pbrl_bag.types import Array
 
@@ -251,7 +251,7 @@ def _grasps(draft: _Draft, places: dict[str, FramePose], found: Candidates, worl
         for name, each in draft.objects.items():
             together = held(_in_world(each, places), _in_world(gripper, places))
             if together is not None:
-                options.append((name, together))
+                options.append((name, while_felt(together, draft.wrenches[side].array())))
         if not options:
             continue
         name, best = max(options, key=lambda pair: (pair[1].share, pair[1].end - pair[1].start))
