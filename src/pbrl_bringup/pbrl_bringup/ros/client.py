@@ -92,6 +92,11 @@ class GraphClient:
         wanted = self.on_the_wire(topic)
         self.wait_until(lambda: self._node.count_publishers(wanted) > 0, timeout, f"nobody publishes {wanted}")
 
+    def wait_for_subscribers(self, topic: str, count: int, timeout: float) -> None:
+        """Wait until so many nodes subscribe to a topic."""
+        complaint = f"{topic} has fewer than {count} subscribers"
+        self.wait_until(lambda: self._node.count_subscribers(topic) >= count, timeout, complaint)
+
     def wait_for_service(self, service: str, timeout: float) -> None:
         """Wait until a node offers a service."""
         wanted = self.on_the_wire(service)
