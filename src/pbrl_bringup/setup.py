@@ -13,7 +13,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["typer", "rich", "jinja2", "psutil", "pydantic", "numpy"],
+    install_requires=["typer", "rich", "jinja2", "psutil", "pydantic", "numpy", "starlette", "uvicorn"],
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from pbrl_bag import Recording, read_recording
+from pbrl_bringup.clouds import ellipse
 from pbrl_bringup.replay import AHEAD, Replay, replay
-from pbrl_bringup.report_build import ellipse, object_report, whole_report
+from pbrl_bringup.report_build import object_report, whole_report
 from pbrl_bringup.report_data import ObjectReport
 from pbrl_model.fitting.fit import motions_of
 from pbrl_model.geometry import mass_properties

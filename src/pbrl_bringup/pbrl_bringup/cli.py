@@ -213,6 +213,35 @@ def info(bag: Bag, mapping: Mapping = None) -> int:
     return _hand_over("info", bag=bag, mapping=mapping)
 
 
+@app.command(epilog="Example: ./pbrl view out/demo/bag --model out/fit/posterior_table_a.nc")
+def view(
+    what: Annotated[
+        str, typer.Argument(metavar="[BAG|live]", help="A recording as for fit, or live: the running graph.")
+    ] = "live",
+    mapping: Mapping = None,
+    model: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Learned model to draw: posterior_NAME.nc of fit or model_NAME.json of diagnose; repeatable."
+        ),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="report.json of diagnose: what was left out, where, and the missing force.")
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0: any. Default: 8765, or any.")
+    ] = None,
+    open_: Annotated[
+        bool | None, typer.Option("--open/--no-open", help="Open a browser. Default: where there is a display.")
+    ] = None,
+    domain: Domain = None,
+) -> int:
+    """Show a recording or a running graph on a page of this machine: top view, forces, models, time."""
+    return _hand_over(
+        "view", what=what, mapping=mapping, models=model or [], report=report, port=port, opened=open_, domain=domain
+    )
+
+
 @app.command("map", epilog="Example: ./pbrl map out/foreign --size table=1.2x0.8 --out mapping.yaml")
 def map_bag(
     bag: Annotated[Path, typer.Argument(help="Bag folder, .mcap, .db3 or .bag file.")],
@@ -232,7 +261,7 @@ def bench(
         str,
         typer.Argument(
             help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose, calibration, concealed, "
-            "tags, control, next-experiment or mismatch."
+            "tags, control, next-experiment, view or mismatch."
         ),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bag import BodyGeometry, Recording
+from pbrl_bringup.clouds import CLOUD, hinge_of, points_of, poses_of, wheel_of
 from pbrl_bringup.replay import Replay
 from pbrl_bringup.report_data import (
     Contact,
@@ -22,7 +23,6 @@ from pbrl_bringup.report_data import (
     ObjectReport,
     Parameter,
     Point,
-    Pose,
     Report,
     Truth,
     Wheel,
@@ -34,7 +34,6 @@ from pbrl_bringup.verdict import (
     hinge_verdict,
     learning_verdict,
     spoken,
-    spread_radius,
     wheel_verdict,
 )
 from pbrl_model.fitting.heldout import Heldout
@@ -45,9 +44,6 @@ Array = NDArray[np.float64]
 
 FRAMES = 15.0  # [Hz] of the pictures; tags come no faster
 SHOWN_DRAWS = 20
-CLOUD = 400  # dots of the posterior
-CHI_95 = math.sqrt(5.991)  # radius that holds 95 % of a normal in the plane, in standard deviations
-DIGITS = 5  # of metres and radians in the page's data: a hundredth of a millimetre
 MEANINGS = {
     "mass": "mass",
     "wheel_x": "held point, in front of the middle",
@@ -91,15 +87,16 @@ def object_report(
     canonical = posterior.canonical()
     starts = sorted({float(replay.time[0]) for replay in replays})
     episodes = [_episode(starts.index(float(replay.time[0])) + 1, replay, rng) for replay in replays]
-    wheel = _wheel(canonical, rng) if "wheel_x" in canonical.names else None
-    hinge = _hinge(canonical, rng) if "hinge_x" in canonical.names else None
+    draws = _named(canonical)
+    wheel = wheel_of(draws, _some(len(draws["mass"]), rng)) if "wheel_x" in draws else None
+    hinge = hinge_of(draws, _some(len(draws["mass"]), rng)) if "hinge_x" in draws else None
     return ObjectReport(
         name=geometry.name,
         verdict=_verdict(geometry, canonical),
         detail=_detail(replays, episodes, hinge),
         model_class=canonical.model_class,
-        footprint=_points(geometry.footprint),
-        casters=_points(geometry.casters),
+        footprint=points_of(geometry.footprint),
+        casters=points_of(geometry.casters),
         parameters=_parameters(geometry, canonical, rng),
         notes=list(canonical.notes),
         wheel=wheel,
@@ -119,7 +116,7 @@ def whole_report(
             title=title,
             verdict="Nothing was learned: no object was held and moved in this recording.",
             detail="",
-            room=_points(recording.room),
+            room=points_of(recording.room),
             objects=[],
             made=_made(recording, command, seed, seconds),
         )
@@ -127,19 +124,10 @@ def whole_report(
         title=title,
         verdict=objects[0].verdict,
         detail=objects[0].detail,
-        room=_points(recording.room),
+        room=points_of(recording.room),
         objects=list(objects),
         made=_made(recording, command, seed, seconds),
     )
-
-
-def ellipse(points: Array, count: int = 73) -> Array:
-    """Return the (count, 2) outline that holds 95 % of a normal with the moments of the (n, 2) points."""
-    turn = np.linspace(0.0, 2.0 * np.pi, count)
-    circle = np.column_stack([np.cos(turn), np.sin(turn)])
-    values, vectors = np.linalg.eigh(np.cov(points.T))
-    axes = vectors * np.sqrt(np.maximum(values, 0.0))
-    return points.mean(axis=0) + CHI_95 * circle @ axes.T
 
 
 def _named(posterior: Posterior) -> dict[str, Array]:
@@ -184,10 +172,10 @@ def _episode(number: int, replay: Replay, rng: np.random.Generator) -> Episode:
         end_before=replay.end_error(replay.before),
         end_after=replay.end_error(replay.after.mean(axis=0)),
         time=[round(float(t), 3) for t in replay.time[rows] - replay.time[0]],
-        recorded=_poses(recorded),
-        before=_poses(before),
-        after=_poses(mean),
-        draws=[_poses(after[k]) for k in shown],
+        recorded=poses_of(recorded),
+        before=poses_of(before),
+        after=poses_of(mean),
+        draws=[poses_of(after[k]) for k in shown],
         wrench=[(round(float(a), 2), round(float(b), 2), round(float(c), 3)) for a, b, c in replay.wrench[rows]],
         contacts=[
             Contact(gripper=side, point=(float(point[0]), float(point[1])))
@@ -202,29 +190,6 @@ def _episode(number: int, replay: Replay, rng: np.random.Generator) -> Episode:
 def _label(number: int, replay: Replay) -> str:
     how = "predicted as a whole" if replay.restart is None else f"predicted {replay.restart:g} s at a time"
     return f"push {number}, {how}" + ("" if replay.fitted else ", not fitted")
-
-
-def _wheel(posterior: Posterior, rng: np.random.Generator) -> Wheel:
-    draws = _named(posterior)
-    theta = draws.get("wheel_theta", np.zeros_like(draws["wheel_x"]))
-    points = np.column_stack([draws["wheel_x"], draws["wheel_y"]])
-    mean = points.mean(axis=0)
-    return Wheel(
-        draws=_poses(_some(np.column_stack([points, theta]), rng)),
-        mean=(float(mean[0]), float(mean[1])),
-        ellipse=_points(ellipse(points)),
-        radius95=spread_radius(points),
-    )
-
-
-def _hinge(posterior: Posterior, rng: np.random.Generator) -> Hinge:
-    draws = _named(posterior)
-    rows = np.column_stack([draws["hinge_x"], draws["hinge_y"], draws["hinge_radius"]])
-    return Hinge(
-        draws=_poses(_some(rows, rng)),
-        mean=(float(rows[:, 0].mean()), float(rows[:, 1].mean()), float(rows[:, 2].mean())),
-        ellipse=_points(ellipse(rows[:, :2])),
-    )
 
 
 def _parameters(geometry: BodyGeometry, posterior: Posterior, rng: np.random.Generator) -> list[Parameter]:
@@ -277,16 +242,8 @@ def _made(recording: Recording, command: str, seed: int | None, seconds: float) 
     )
 
 
-def _some(rows: Array, rng: np.random.Generator) -> Array:
-    return rows[np.sort(rng.choice(len(rows), min(CLOUD, len(rows)), replace=False))]
-
-
-def _poses(rows: Array) -> list[Pose]:
-    return [(float(x), float(y), float(t)) for x, y, t in np.round(rows, DIGITS)]
-
-
-def _points(rows: Array) -> list[Point]:
-    return [(float(x), float(y)) for x, y in np.round(rows, DIGITS)]
+def _some(count: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    return np.sort(rng.choice(count, min(CLOUD, count), replace=False))
 
 
 def _short(value: float) -> str:

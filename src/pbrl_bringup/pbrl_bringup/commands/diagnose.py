@@ -14,6 +14,7 @@ from pbrl_bag import read_recording
 from pbrl_bringup.diagnosis.doors import run_doors
 from pbrl_bringup.diagnosis.models import write_models
 from pbrl_bringup.diagnosis.page import write_diagnosis
+from pbrl_bringup.diagnosis.residuals import RESIDUALS, residuals_to_json
 from pbrl_bringup.files import result_folder, write_json
 from pbrl_bringup.terminal import output, say, table
 from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis, diagnose
@@ -67,6 +68,8 @@ def command(
         with Console(stderr=True).status(f"diagnosing (baseline {', '.join(options.baseline)}, seed {seed})"):
             found = diagnose(recording, options)
         write_json(folder / "report.json", found.to_report())
+        residuals = {name: each.residual for name, each in found.objects.items()}
+        write_json(folder / RESIDUALS, residuals_to_json(residuals))
         models = write_models(found, folder, seed)
         write_diagnosis(found, recording, asked_for, folder / "report.html", options=options, models=models)
     print_diagnosis(found)

@@ -2,34 +2,41 @@
 
 const report = JSON.parse(document.getElementById("report").textContent);
 
-function makePlayer(section) {
+function makePage(section) {
   const object = report.objects[Number(section.dataset.object)];
-  const find = (selector) => section.querySelector(selector);
-  const slider = find("input[type=range]"), button = find(".play"), clock = find(".clock"), now = find(".now");
-  let episode, updates, end, timer = null, time = 0, stamp = 0;
+  const find = (selector) => section.querySelector(selector), now = find(".now");
+  let episode, updates, end = 1;
+  const player = makePlayer({ slider: find("input[type=range]"), button: find(".play"), clock: find(".clock"), span: () => [0, end], show });
 
-  function show(t) {
-    time = Math.min(Math.max(t, 0), end);
+  function show(time) {
     const index = indexOf(episode.time, time);
-    slider.value = String(Math.round((1000 * time) / end));
-    clock.textContent = `${time.toFixed(1)} of ${end.toFixed(1)} s`;
     updates.scene(index);
     updates.cursors.forEach((move) => move(time));
-    now.innerHTML = errors(index);
+    tellErrors(index);
   }
 
-  function errors(index) {
+  // A sentence whose numbers have the colours of their curves.
+  function tellErrors(index) {
     const [before, after] = [episode.error_before, episode.error_after].map((e) => (e.length ? valueAt(e, index) : null));
     const parts = [];
-    if (before !== null) parts.push(`before learning off by <span class="before">${length(before)}</span>`);
-    if (after !== null) parts.push(`after learning by <span class="after">${length(after)}</span>`);
-    if (!parts.length) return "";
-    if (!headingSeen(episode)) return `At this moment: prediction ${parts.join(", ")}.`;
+    if (before !== null) parts.push(["before learning off by ", coloured("before", length(before))]);
+    if (after !== null) parts.push(["after learning by ", coloured("after", length(after))]);
+    now.replaceChildren();
+    if (!parts.length) return;
+    const told = parts.flatMap((part, i) => (i ? [", ", ...part] : part));
+    if (!headingSeen(episode)) return now.append("At this moment: prediction ", ...told, ".");
     const [start, here] = [episode.recorded[0][2], poseAt(episode.recorded, index)[2]];
-    const turned = (Math.atan2(Math.sin(here - start), Math.cos(here - start)) * 180) / Math.PI;
+    const turned = (wrapped(here - start) * 180) / Math.PI;
     const way = Math.abs(turned) < 0.5 ? "" : turned > 0 ? " to the left" : " to the right";
     const since = episode.restart ? ` (both start again every ${episode.restart} s from where the ${object.name.replace(/_.$/, "").replaceAll("_", " ")} was)` : "";
-    return `At this moment it has turned by ${Math.abs(turned).toFixed(0)}\u00b0${way}; prediction ${parts.join(", ")}${since}.`;
+    now.append(`At this moment it has turned by ${Math.abs(turned).toFixed(0)}\u00b0${way}; prediction `, ...told, `${since}.`);
+  }
+
+  function coloured(kind, text) {
+    const node = document.createElement("span");
+    node.className = kind;
+    node.textContent = text;
+    return node;
   }
 
   function choose(number) {
@@ -38,7 +45,7 @@ function makePlayer(section) {
     section.querySelectorAll(".has-before").forEach((node) => { node.hidden = !episode.before.length; });
     updates = { scene: drawScene(find(".scene svg"), object, episode, report.room),
       cursors: [...drawMotion(find(".motion"), episode), ...drawEffort(find(".effort"), episode)] };
-    show(telling());
+    player.jump(telling());
   }
 
   // Where predictions part most, if they start again and again; else the last moment with a force worth an arrow: the picture that tells most before anybody touches the slider.
@@ -49,32 +56,7 @@ function makePlayer(section) {
     return last > 0 ? episode.time[last] : end;
   }
 
-  function stop() {
-    if (timer !== null) cancelAnimationFrame(timer);
-    timer = null;
-    button.innerHTML = "&#9654;";
-    button.setAttribute("aria-label", "play");
-  }
-
-  function frame(moment) {
-    show(time + (moment - stamp) / 1000);
-    stamp = moment;
-    if (time >= end) stop();
-    else timer = requestAnimationFrame(frame);
-  }
-
-  function toggle() {
-    if (timer !== null) return stop();
-    if (time >= end) time = 0;
-    button.innerHTML = "&#10073;&#10073;";
-    button.setAttribute("aria-label", "pause");
-    stamp = performance.now();
-    timer = requestAnimationFrame(frame);
-  }
-
-  slider.addEventListener("input", () => { stop(); show((Number(slider.value) / 1000) * end); });
-  button.addEventListener("click", toggle);
-  find(".episodes").addEventListener("change", (event) => { stop(); choose(Number(event.target.value)); });
+  find(".episodes").addEventListener("change", (event) => choose(Number(event.target.value)));
   if (object.wheel) {
     drawBody(find(".posterior .body"), object);
     drawZoom(find(".posterior .zoom"), object);
@@ -82,16 +64,17 @@ function makePlayer(section) {
     drawHinge(find(".posterior .zoom"), object);
   }
   choose(0);
-  return { toggle, step: (seconds) => { stop(); show(time + seconds); }, to: (share) => { stop(); show(share * end); } };
+  return (event) => playerKey(player, () => [0, end], event);
 }
 
-const players = [...document.querySelectorAll("section.object")].filter((s) => report.objects[Number(s.dataset.object)].episodes.length).map(makePlayer);
+const pages = [...document.querySelectorAll("section.object")].filter((s) => report.objects[Number(s.dataset.object)].episodes.length).map(makePage);
 
 document.addEventListener("keydown", (event) => {
   if (event.target.tagName === "SELECT" || event.ctrlKey || event.metaKey || event.altKey) return;
-  const actions = { " ": (p) => p.toggle(), ArrowLeft: (p) => p.step(-0.1), ArrowRight: (p) => p.step(0.1), Home: (p) => p.to(0), End: (p) => p.to(1) };
-  const action = actions[event.key];
-  if (!action) return;
-  event.preventDefault();
-  players.forEach(action);
+  for (const page of pages) {
+    const action = page(event);
+    if (!action) return;
+    event.preventDefault();
+    action();
+  }
 });

@@ -5,8 +5,7 @@ const PLOT = { width: 540, height: 118, left: 52, right: 10, top: 20, bottom: 20
 function unwrap(angles) {
   const out = [angles[0]];
   for (let i = 1; i < angles.length; i++) {
-    const step = angles[i] - angles[i - 1];
-    out.push(out[i - 1] + Math.atan2(Math.sin(step), Math.cos(step)));
+    out.push(out[i - 1] + wrapped(angles[i] - angles[i - 1]));
   }
   return out;
 }
@@ -28,24 +27,17 @@ function range(series) {
 
 // One plot: `series` of {values, kind}; returns a function that moves the cursor to a time.
 function drawPlot(parent, title, unit, time, series, band, last) {
-  const svg = element(parent.querySelector("svg.seed") || seed(parent), "svg");
-  const height = PLOT.height + (last ? 14 : 0);
-  parent.appendChild(svg);
-  svg.setAttribute("viewBox", `0 0 ${PLOT.width} ${height}`);
+  const height = PLOT.height + (last ? 14 : 0), svg = element(parent, "svg", { viewBox: `0 0 ${PLOT.width} ${height}` });
   let [low, high] = range(series);
   const pad = Math.max(0.08 * (high - low), 1e-3);
   low -= pad; high += pad;
   const end = time[time.length - 1] || 1, bottom = PLOT.height - PLOT.bottom;
   const X = (t) => PLOT.left + (t / end) * (PLOT.width - PLOT.left - PLOT.right);
-  const Y = (v) => bottom - ((v - low) / (high - low)) * (bottom - PLOT.top);
-  const step = niceStep(high - low, 3), digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-  for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
-    element(svg, "path", { class: "grid", d: `M${PLOT.left} ${Y(v)}H${PLOT.width - PLOT.right}` });
-    element(svg, "text", { x: PLOT.left - 7, y: Y(v) + 4, "text-anchor": "end" }, (Math.abs(v) < step / 2 ? 0 : v).toFixed(digits));
+  const Y = plotAxes(svg, PLOT, [low, high], title, unit);
+  if (last) {
+    timeAxis(svg, X, 0, end, bottom);
+    element(svg, "text", { x: X(end), y: bottom + 31, "text-anchor": "end" }, "seconds since the push began");
   }
-  element(svg, "text", { class: "strong", x: PLOT.left, y: 13 }, title);
-  element(svg, "text", { x: PLOT.width - PLOT.right, y: 13, "text-anchor": "end" }, unit);
-  if (last) timeAxis(svg, X, end, bottom);
   const inside = element(svg, "svg", { x: 0, y: PLOT.top - 4, width: PLOT.width, height: bottom - PLOT.top + 8,
     viewBox: `0 ${PLOT.top - 4} ${PLOT.width} ${bottom - PLOT.top + 8}` });
   if (band) {
@@ -57,20 +49,6 @@ function drawPlot(parent, title, unit, time, series, band, last) {
   }
   const cursor = element(svg, "path", { class: "cursor" });
   return (t) => cursor.setAttribute("d", `M${X(t)} ${PLOT.top - 2}V${bottom}`);
-}
-
-function seed(parent) {
-  parent.insertAdjacentHTML("beforeend", '<svg class="seed" hidden width="0" height="0" style="display:none"></svg>');
-  return parent.querySelector("svg.seed");
-}
-
-function timeAxis(svg, X, end, bottom) {
-  const step = niceStep(end, 6);
-  for (let t = 0; t <= end + 1e-9; t += step) {
-    element(svg, "path", { class: "axis", d: `M${X(t)} ${bottom}v4` });
-    element(svg, "text", { x: X(t), y: bottom + 17, "text-anchor": "middle" }, trim(t.toFixed(1)));
-  }
-  element(svg, "text", { x: X(end), y: bottom + 31, "text-anchor": "end" }, "seconds since the push began");
 }
 
 // Whether anything told the heading: an angle that never moves by the least bit was not recorded.

@@ -37,7 +37,7 @@ function drawBody(svg, object) {
   const corner = { x: Math.min(a[0], b[0]), y: Math.min(a[1], b[1]) };
   element(svg, "rect", { class: "axis", fill: "none", "stroke-dasharray": "2 3", ...corner, width: Math.abs(b[0] - a[0]), height: Math.abs(b[1] - a[1]) });
   element(svg, "text", { class: "halo", x: 12, y: 20 }, "seen from above in its own axes; front: right");
-  scaleBar(svg, view, width, height);
+  scaleBar(svg, view);
 }
 
 // Corners of what the enlarged picture shows: the cloud, its ellipse and what lies close to it.
@@ -62,7 +62,7 @@ function drawZoom(svg, object) {
   cloud(svg, view, object.wheel, 2.4);
   truthMarks(svg, view, object, 15);
   element(svg, "text", { class: "halo", x: 12, y: 20 }, "enlarged; cross: mean, line: 95 % region");
-  scaleBar(svg, view, width, height);
+  scaleBar(svg, view);
 }
 
 function drawHinge(svg, object) {
@@ -77,5 +77,5 @@ function drawHinge(svg, object) {
   const side = x < width / 2 ? { x: Math.max(x - 8, 12), "text-anchor": "start" } : { x: Math.min(x + 8, width - 12), "text-anchor": "end" };
   element(svg, "text", { class: "aftertext halo", y: y + (y > height - 80 ? -14 : 22), ...side }, `hinge, radius ${length(hinge.mean[2])}`);
   element(svg, "text", { class: "halo", x: 12, y: 20 }, "solid: recorded path; dotted: circle about the hinge");
-  scaleBar(svg, view, width, height);
+  scaleBar(svg, view);
 }

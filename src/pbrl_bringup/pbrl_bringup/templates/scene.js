@@ -13,15 +13,6 @@ function sceneBox(object, episode) {
   return [low(0), low(1), high(2), high(3)];
 }
 
-function drawFloor(svg, view, room) {
-  const step = niceStep(view.right - view.left, 7);
-  let lines = "";
-  for (let x = Math.ceil(view.left / step) * step; x < view.right; x += step) lines += `M${view.map([x, 0])[0]} 0V${SCENE.height}`;
-  for (let y = Math.ceil(view.bottom / step) * step; y < view.top; y += step) lines += `M0 ${view.map([0, y])[1]}H${SCENE.width}`;
-  element(svg, "path", { class: "grid", d: lines });
-  if (room.length) element(svg, "path", { class: "room", d: path(room.map(view.map), true) });
-}
-
 // Draws the still parts and returns a function that moves the rest to a fractional index.
 function drawScene(svg, object, episode, room) {
   svg.replaceChildren();
@@ -49,7 +40,7 @@ function drawScene(svg, object, episode, room) {
   const newtons = element(svg, "text", { class: "forcetext halo" });
   const beforeText = element(svg, "text", { class: "beforetext halo", "text-anchor": "middle" }, "before learning");
   const strongest = Math.max(...episode.wrench.map((w) => Math.hypot(w[0], w[1])), 1e-6);
-  scaleBar(svg, view, SCENE.width, SCENE.height);
+  scaleBar(svg, view);
   element(svg, "text", { class: "halo", x: 14, y: 24 }, "dotted: where it stood before the push");
 
   const outline = (node, pose) => node.setAttribute("d", path(place(object.footprint, pose).map(view.map), true));
@@ -62,13 +53,10 @@ function drawScene(svg, object, episode, room) {
     const size = Math.hypot(...force);
     const base = held.length ? [0, 1].map((k) => held.reduce((sum, p) => sum + p[k], 0) / held.length) : pose;
     const [x, y] = view.map(base), pixels = (110 * size) / strongest;
-    const visible = pixels > 9 ? "visible" : "hidden";
-    for (const node of [shaft, head, newtons]) node.setAttribute("visibility", visible);
     const [ux, uy] = size > 0 ? [force[0] / size, -force[1] / size] : [0, 0];
     // The arrow's point touches the gripper: a push is read as coming from outside.
-    const tail = [x - ux * pixels, y - uy * pixels], neck = [x - ux * 11, y - uy * 11];
-    shaft.setAttribute("d", path([tail, neck]));
-    head.setAttribute("d", path([[x, y], [neck[0] - uy * 6, neck[1] + ux * 6], [neck[0] + uy * 6, neck[1] - ux * 6]], true));
+    const tail = [x - ux * pixels, y - uy * pixels], seen = setArrow(shaft, head, tail, [x, y]);
+    newtons.setAttribute("visibility", seen ? "visible" : "hidden");
     newtons.textContent = size.toFixed(0) + " N";
     newtons.setAttribute("x", Math.min(Math.max(tail[0] - ux * 22 - 14, 4), SCENE.width - 44));
     newtons.setAttribute("y", Math.min(Math.max(tail[1] - uy * 14 + 4, 16), SCENE.height - 8));

@@ -1,0 +1,107 @@
+// The page: one time for the picture, the curves and the words; keys; what comes new from a running graph.
+
+const byId = (id) => document.getElementById(id);
+
+async function fetched(address) {
+  const answer = await fetch(address);
+  if (!answer.ok) throw new Error(`${address}: ${answer.status}`);
+  return answer.json();
+}
+
+function begin(data) {
+  const span = () => [0, Math.max(data.end, 1e-3)];
+  let streams = makeStreams(data), drawing = false, scene, plots, now;
+  const following = byId("follow"), speed = byId("speed");
+  byId("title").textContent = document.title = data.title;
+  tellState();
+
+  // The largest horizontal force [N] that a gripper felt.
+  function largest(i) {
+    const found = streams.whole("forces", i);
+    if (!found) return 0;
+    const ends = (column) => Math.max(...(found.high || found.low)[column].map((v, k) => Math.max(Math.abs(v), Math.abs(found.low[column][k]))), 0);
+    return Math.hypot(ends(0), ends(1));
+  }
+
+  function centre(i) {
+    const seen = streams.pose("objects", i, player.time()), pose = seen ? [seen.x, seen.y] : data.objects[i].pose;
+    const [x, y] = pose ? scene.view().map(pose) : [0, 0];
+    if (pose) scene.move(scene.view().width / 2 - x, scene.view().height / 2 - y);
+  }
+
+  function build() {
+    scene = makeScene(byId("scene"), data, streams, largest);
+    plots = makePlots(byId("curves"), data, streams, { span, set: (t) => jump(t), zoomed });
+    now = makeNow(byId("now").tBodies[0], data, streams, centre);
+    makeLegend(byId("legend"), data);
+    makeNotes(byId("notes"), data);
+  }
+
+  function tellState(text) {
+    const held = data.live ? "live" : `${data.end.toFixed(1)} s`;
+    byId("state").textContent = text || `${held}, ${data.objects.length} objects, ${data.grippers.length} grippers`;
+  }
+
+  function draw() {
+    drawing = false;
+    const t = player.time();
+    scene.update(t);
+    plots.move(t);
+    now(t);
+  }
+
+  // At most one picture a frame, however often the slider moves.
+  function show(t) {
+    if (!drawing) {
+      drawing = true;
+      requestAnimationFrame(draw);
+    }
+    streams.near(t).then((fresh) => { if (fresh) show(player.time()); }, lost);
+  }
+
+  function lost(error) { tellState(`no answer from the server (${error.message}); start ./pbrl view again`); }
+
+  function zoomed(from, to) {
+    byId("whole").hidden = to - from >= span()[1] - 1e-6;
+    if (!byId("whole").hidden) streams.window(from, to).then((fresh) => { if (fresh) plots.draw(); }, lost);
+  }
+
+  const player = makePlayer({ slider: document.querySelector("#player input"), button: document.querySelector("#player .play"),
+    clock: document.querySelector("#player .clock"), span, show, speed: () => Number(speed.value) });
+
+  function jump(t) {
+    follow(false);
+    player.jump(t);
+  }
+
+  function follow(on) {
+    following.setAttribute("aria-pressed", String(on && data.live));
+    if (on && data.live) player.jump(data.end);
+  }
+
+  const keys = { "+": () => scene.zoom(1.25), "=": () => scene.zoom(1.25), "-": () => scene.zoom(0.8), f: () => scene.fit(),
+    a: () => plots.whole(), "[": () => plots.zoom(0.8), "]": () => plots.zoom(1.25), "?": () => byId("help").showModal() };
+
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "SELECT" || byId("help").open) return;
+    if (event.key === " " && event.target.tagName === "BUTTON") return; // it is pressed
+    const action = keys[event.key] || playerKey(player, span, event);
+    if (!action) return;
+    if (!keys[event.key]) follow(false);
+    event.preventDefault();
+    action();
+  });
+  byId("closer").addEventListener("click", keys["+"]);
+  byId("farther").addEventListener("click", keys["-"]);
+  byId("fit").addEventListener("click", keys.f);
+  byId("whole").addEventListener("click", keys.a);
+  byId("help-open").addEventListener("click", keys["?"]);
+  following.addEventListener("click", () => follow(following.getAttribute("aria-pressed") !== "true"));
+  for (const kind of ["input", "pointerdown"]) byId("player").querySelector("input").addEventListener(kind, () => follow(false));
+  build();
+  new ResizeObserver(() => { scene.resize(); plots.draw(); }).observe(byId("curves"));
+  player.to(0);
+  requestAnimationFrame(() => requestAnimationFrame(() => performance.mark("first-picture")));
+}
+
+fetched("data").then(begin, (error) => { byId("title").textContent = `No data: ${error.message}`; });
