@@ -5,10 +5,8 @@ Exit codes: 0 done; 1 a fault of ours, or tests that fail; 2 something the perso
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
-import traceback
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -18,20 +16,8 @@ from typing import Annotated, Any
 import typer
 from typer.exceptions import TyperException
 
+from pbrl_bringup.cli_errors import complain, complain_of
 from pbrl_bringup.cli_options import Bag, Domain, Engine, Likelihood, Many, Mapping, Namespace, Out, Sampler, Seed
-
-# Errors whose message is for the person at the keyboard. Named, not imported: an error can only have
-# been raised by a module that is loaded, and loading all of them would slow every start.
-USER_ERRORS = {
-    "pbrl_bag.errors": "BagError",
-    "pbrl_model.errors": "ModelError",
-    "pbrl_mismatch.errors": "MismatchError",
-    "pbrl_control.errors": "ControlError",
-    "pbrl_planner.errors": "PlannerError",
-    "pbrl_namo.errors": "NamoError",
-    "bullet_sim.errors": "SimError",
-    "pbrl_bringup.errors": "BringupError",
-}
 
 STOPPED = 130  # what Ctrl-C ends with; typer itself turns it into this code
 
@@ -320,35 +306,13 @@ def run_arguments(arguments: Sequence[str]) -> int:
     """Run one command and return its exit code; every error ends here, as one line on stderr."""
     try:
         code = int(app(args=list(arguments) or ["--help"], prog_name="pbrl", standalone_mode=False) or 0)
-        return _complain("stopped", STOPPED) if code == STOPPED else code
+        return complain("stopped", STOPPED) if code == STOPPED else code
     except TyperException as error:
-        return _complain(" ".join(error.format_message().split()) or "see --help", 2)
+        return complain(" ".join(error.format_message().split()) or "see --help", 2)
     except KeyboardInterrupt:
-        return _complain("stopped", STOPPED)
+        return complain("stopped", STOPPED)
     except Exception as error:
-        if _is_for_the_user(error):
-            return _complain(" ".join(str(error).split()), 2)
-        return _complain(_fault(error), 1)
-
-
-def _is_for_the_user(error: Exception) -> bool:
-    loaded = [(sys.modules[module], name) for module, name in USER_ERRORS.items() if module in sys.modules]
-    return isinstance(error, tuple(getattr(module, name) for module, name in loaded))
-
-
-def _fault(error: Exception) -> str:
-    """Describe an error that nobody foresaw; PBRL_TRACEBACK=1 shows where it comes from."""
-    if os.environ.get("PBRL_TRACEBACK"):
-        traceback.print_exception(error)
-    frame = traceback.extract_tb(error.__traceback__)[-1]
-    what = " ".join(f"{type(error).__name__}: {error}".split())
-    where = f"{Path(frame.filename).name}:{frame.lineno}"
-    return f"a fault in pbrl at {where}, {what}; PBRL_TRACEBACK=1 shows more"
-
-
-def _complain(message: str, code: int) -> int:
-    print(f"pbrl: {message}", file=sys.stderr)
-    return code
+        return complain_of(error)
 
 
 def _leave(number: int, frame: FrameType | None) -> None:

@@ -12,7 +12,7 @@ from pbrl_msgs.srv import LearnModel, PushObject
 from pbrl_bringup.benches.rows import Measured, at_least, at_most
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.files import new_folder_place
-from pbrl_bringup.graph import Node, free_domain, node_command, node_environment
+from pbrl_bringup.graph import Node, Scalar, free_domain, node_command, node_environment
 from pbrl_bringup.processes import Programs
 from pbrl_bringup.ros.client import GraphClient
 from pbrl_model.ros.conversions import models_from_msg
@@ -75,7 +75,7 @@ def learned_live(seed: int, pushes: tuple[PushObject.Request, ...], bag: Path, l
 
 def learned_again(seed: int, rate: float, bag: Path, logs: Path) -> Array:
     """Return the samples of what is learned while the recording is played."""
-    parameters = {"bag": str(bag), "rate": rate, "wait_for": list(STREAMS)}
+    parameters: dict[str, Scalar] = {"bag": str(bag), "rate": rate, "wait_for": list(STREAMS)}
     player = Node(package="pbrl_bag", executable="player_node", parameters=parameters)
     with free_domain() as domain, Programs(logs, node_environment(domain)) as programs:
         programs.start("model_again", node_command("model", model()))
