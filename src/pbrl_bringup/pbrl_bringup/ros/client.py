@@ -94,8 +94,9 @@ class GraphClient:
 
     def wait_for_subscribers(self, topic: str, count: int, timeout: float) -> None:
         """Wait until so many nodes subscribe to a topic."""
-        complaint = f"{topic} has fewer than {count} subscribers"
-        self.wait_until(lambda: self._node.count_subscribers(topic) >= count, timeout, complaint)
+        wanted = self.on_the_wire(topic)
+        complaint = f"{wanted} has fewer than {count} subscribers"
+        self.wait_until(lambda: self._node.count_subscribers(wanted) >= count, timeout, complaint)
 
     def wait_for_service(self, service: str, timeout: float) -> None:
         """Wait until a node offers a service."""
