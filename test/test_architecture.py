@@ -69,8 +69,8 @@ ENDPOINTS = {
     "ActionClient",
     "ActionServer",
 }
-ENDPOINTS |= {"OneGoal", "Saying", "listen"}
-GLOBAL = {"/clock", "/tf", "/tf_static"}  # absolute in every stack
+ENDPOINTS |= {"OneGoal", "Saying", "listen", "subscribe", "hear"}
+GLOBAL = {"/clock", "/tf", "/tf_static", "/diagnostics"}  # absolute in every stack
 
 
 @pytest.mark.parametrize(
@@ -86,6 +86,14 @@ def test_names_are_relative_so_that_two_robots_can_share_a_domain(path: Path) ->
             first = argument.values[0] if isinstance(argument, ast.JoinedStr) else argument
             text = first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else ""
             assert not text.startswith("/") or text in GLOBAL, f"{path}:{node.lineno}: {text!r} is absolute"
+
+
+def test_every_node_that_stays_tells_how_it_is() -> None:
+    for path in (ROOT / "src").glob("*/*/ros/*_node.py"):
+        text = path.read_text(encoding="utf-8")
+        if path.name != "player_node.py":  # ends with its bag
+            assert "Diagnostics(self" in text or "(PacedSimulator)" in text, f"{path}: tells nothing on /diagnostics"
+    assert "Diagnostics(self" in (ROOT / "src/bullet_sim/bullet_sim/ros/paced.py").read_text(encoding="utf-8")
 
 
 def test_no_import_ring_inside_a_package() -> None:

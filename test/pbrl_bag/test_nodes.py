@@ -41,8 +41,10 @@ class Graph:
         self.executor.add_node(self.node)
         self.processes: list[subprocess.Popen] = []
 
-    def start(self, name: str, **parameters: object) -> subprocess.Popen:
+    def start(self, name: str, namespace: str = "", **parameters: object) -> subprocess.Popen:
         command = [str(executable("pbrl_bag", name)), "--ros-args"]
+        if namespace:
+            command += ["-r", f"__ns:={namespace}", "-r", f"/clock:={namespace}/clock"]
         for key, value in parameters.items():
             command += ["-p", f"{key}:={value}"]
         process = subprocess.Popen(command, env=os.environ.copy(), stderr=subprocess.PIPE, text=True)
@@ -210,18 +212,22 @@ def test_a_player_that_is_stopped_ends_without_a_word_of_python(
     assert "Traceback" not in errors
 
 
+@pytest.mark.parametrize(("of", "now"), [("", ""), ("/a", "/fleet/b")], ids=["root", "another namespace"])
 def test_what_is_played_and_recorded_again_reads_the_same(
-    graph: Graph, push_bag: Path, tmp_path: Path, kit: SimpleNamespace
+    graph: Graph, push_bag: Path, tmp_path: Path, kit: SimpleNamespace, of: str, now: str
 ) -> None:
-    recorder = graph.start("recorder_node", output=tmp_path / "again", exclude="['/clock', '/rosout']")
-    player = graph.start(
-        "player_node", bag=push_bag, rate="8.0", wait_for="['/wrist_ft/left', '/ar_tags/table/pose', '/grasps']"
-    )
+    bag = kit.write(tmp_path / "of", [(of + topic, *rest) for topic, *rest in kit.pushing()])
+    recorder = graph.start("recorder_node", now, output=tmp_path / "again", exclude="['/clock', '/rosout']")
+    awaited = [f"{of}{topic}" for topic in ("/wrist_ft/left", "/ar_tags/table/pose", "/grasps")]
+    player = graph.start("player_node", now, bag=bag, rate="8.0", wait_for=str(awaited))
     graph.until(lambda: player.poll() is not None)
-    recorded = tmp_path / "again" / "again_0.mcap"
-    graph.until(lambda: len([m for m in McapFile(recorded).messages() if m.topic == "/wrist_ft/left"]) >= 200)
+    recorded, topic = tmp_path / "again" / "again_0.mcap", f"{now}/wrist_ft/left"
+    graph.until(lambda: len([m for m in McapFile(recorded).messages() if m.topic == topic]) >= 200)
     recorder.send_signal(signal.SIGINT)
     recorder.communicate(timeout=PATIENCE)
+    names = {topic.name for topic in describe(tmp_path / "again").topics}
+    assert f"{now}/clock" not in names, "patterns are of names as in the root"
+    assert all(name.startswith(f"{now}/") for name in names)
     first, again = read_recording(push_bag), read_recording(tmp_path / "again")
     assert repr(again.grasps) == repr(first.grasps)
     assert repr(again.wrenches) == repr(first.wrenches)

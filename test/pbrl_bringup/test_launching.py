@@ -62,7 +62,7 @@ class NodeAction:
     executable: str
     name: str
     namespace: str
-    parameters: list[dict[str, Any]]
+    parameters: list[Any]
     output: str
     remappings: list[tuple[str, str]] = field(default_factory=list)
 
@@ -158,6 +158,11 @@ def test_optional_nodes_are_started_when_asked_for() -> None:
     assert list(nodes) == ["sim", "controller", "tags", "recorder"]
     with pytest.raises(BringupError, match="the graph has no node 'recoder'; its nodes are sim, controller"):
         launched("krang", **{"with": "recoder"})
+
+
+def test_a_file_of_parameters_comes_after_those_of_the_graph() -> None:
+    for node in launched("pr2", params_file="mine.yaml").values():
+        assert len(node.parameters) == 2 and node.parameters[1] == "mine.yaml"
 
 
 def test_a_namespace_that_is_none_is_refused() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, Vector3
 from pbrl_msgs.srv import PushObject
 from rclpy.context import Context
@@ -36,6 +37,11 @@ class Yard:
         self.node = Node("user", context=self._context, enable_rosout=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
+        self.told: set[str] = set()
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._tell, 10)
+
+    def _tell(self, message: DiagnosticArray) -> None:
+        self.told |= {status.name for status in message.status}
 
     def until(self, condition: Callable[[], Any]) -> None:
         deadline = time.monotonic() + PATIENCE
@@ -83,6 +89,7 @@ def test_two_robots_push_side_by_side(yard: Yard) -> None:
         calls.append(client.call_async(push))
     yard.until(lambda: all(call.done() for call in calls))
     assert [call.result().message for call in calls] == ["done", "done"]
+    yard.until(lambda: yard.told >= {f"{robot[1:]}/{name}" for robot in ROBOTS for name in ("hand", "recorder")})
 
     lengths = []
     for number, robot in enumerate(ROBOTS):

@@ -25,6 +25,7 @@ from std_msgs.msg import Float64MultiArray
 from bullet_sim.errors import SimError
 from bullet_sim.grippers import GraspOutcome
 from bullet_sim.messages import LATCHED, to_messages
+from bullet_sim.ros.diagnostics import PaceDiagnostics
 from bullet_sim.ros.names import relative
 from bullet_sim.ros.parameters import declare
 
@@ -110,6 +111,7 @@ class PacedSimulator(Node):
             topic: self.create_publisher(kind, relative(topic), _quality(topic, latched))
             for topic, kind in types.items()
         }
+        self._diagnostics = PaceDiagnostics(self, lambda: session.time, self._rate, lambda: self._heard)
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
 

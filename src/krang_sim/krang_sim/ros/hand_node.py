@@ -16,6 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from bullet_sim.errors import SimError
+from bullet_sim.ros.diagnostics import PaceDiagnostics
 from bullet_sim.ros.names import relative
 from bullet_sim.ros.parameters import declare, refuse_unknown
 from bullet_sim.ros.running import run_node
@@ -58,8 +59,12 @@ class HandNode(Node):
         }
         self._publish(self._session.latched())
         self.create_service(PushObject, "push", self._push)
+        self._pushes = 0
+        # Its time stands still between pushes: no pace is too slow.
+        self._diagnostics = PaceDiagnostics(self, lambda: self._at, 0.0, lambda: self._pushes)
 
     def _push(self, request: PushObject.Request, response: PushObject.Response) -> PushObject.Response:
+        self._pushes += 1
         contact, way = request.contact_point, request.direction
         self._origin = time.monotonic() - (self._at / self._rate if self._rate else 0.0)
         try:

@@ -19,6 +19,7 @@ from pbrl_bag.errors import BagError
 from pbrl_bag.names import GLOBAL, canonical
 from pbrl_bag.qos import Qos
 from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.stopping import init_until_signal, spin_until
 from pbrl_bag.writer import BagWriter
@@ -52,10 +53,17 @@ class RecorderNode(Node):
         self._refused: set[str] = set()
         self._global = {self.resolve_topic_name(name) for name in GLOBAL}
         self._sim_time = bool(self.get_parameter("use_sim_time").value)
+        self._diagnostics = Diagnostics(self, self._doing, numbers=self._numbers)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DISCOVERY_SECONDS, self.discover, clock=self._steady)
         self.discover()
         self.get_logger().info(f"recording into {self.output}")
+
+    def _doing(self) -> str:
+        return f"records into {self.output}" if self._heard else "waits for a topic that somebody publishes"
+
+    def _numbers(self) -> dict[str, object]:
+        return {"topics": len(self._heard), "left out": len(self._refused), "messages": self.writer.message_count}
 
     def wants(self, topic: str) -> bool:
         """Tell whether a topic is to be recorded, by its name on the wire."""

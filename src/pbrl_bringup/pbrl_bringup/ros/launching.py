@@ -6,6 +6,7 @@
 - `robot:=true`: a real robot takes the simulator's place, which is left out.
 - `use_sim_time`: auto (as the graph says; false with a real robot), true or false.
 - `with`: optional nodes to start too, with commas.
+- `params_file`: parameters by node, over those of the graph, in the usual form.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ ARGUMENTS = {
     "robot": ("false", "a real robot takes the simulator's place", ("true", "false")),
     SIM_TIME: ("auto", "auto: as the graph says, false with a real robot", ("auto", "true", "false")),
     "with": ("", "optional nodes to start too, with commas", None),
+    "params_file": ("", "parameters by node, over those of the graph; empty: none", None),
 }
 """Default, description and choices of a launch file's arguments."""
 
@@ -46,7 +48,7 @@ def describe(name: str) -> Any:
 
     def chosen(context: Any) -> list[Any]:
         given = {each: LaunchConfiguration(each).perform(context) for each in ARGUMENTS}
-        return [_action(each, node, given["namespace"]) for each, node in selected(graph, given).items()]
+        return [_action(name, node, given) for name, node in selected(graph, given).items()]
 
     declared = [
         DeclareLaunchArgument(each, default_value=default, description=text, choices=choices and list(choices))
@@ -82,17 +84,18 @@ def _timed(node: Node, sim_time: str, robot: bool) -> Node:
     return node.model_copy(update={"parameters": {**node.parameters, SIM_TIME: sim_time == "true"}})
 
 
-def _action(name: str, node: Node, namespace: str) -> Any:
+def _action(name: str, node: Node, given: dict[str, str]) -> Any:
     """Return the action that starts a node."""
     from launch_ros.actions import Node as NodeAction
 
-    robot = parse_namespace(namespace)
+    robot = parse_namespace(given["namespace"])
+    parameters: list[Any] = [{key: _parameter(value) for key, value in node.parameters.items()}]
     return NodeAction(
         package=node.package,
         executable=node.executable,
         name=name,
         namespace=robot,
-        parameters=[{key: _parameter(value) for key, value in node.parameters.items()}],
+        parameters=parameters + [file for file in (given["params_file"],) if file],
         remappings=[(topic, robot + topic) for topic in GLOBAL] if robot else [],
         output="screen",
     )

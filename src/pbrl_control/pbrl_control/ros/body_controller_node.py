@@ -25,6 +25,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
 from pbrl_bag.ros.stopping import spin_in_order
@@ -87,6 +88,7 @@ class BodyControllerNode(Node):
         self._moving = False
         self._in_motion = self._arms_in_motion = False
         self._report = ""
+        self._diagnostics = Diagnostics(self, self._doing, lambda: self._report, self._numbers)
         self._create_publishers()
         self._create_subscriptions()
         if self._rate:
@@ -102,14 +104,15 @@ class BodyControllerNode(Node):
         self._share = self.create_publisher(Float64, "body_controller/share", COMMANDS)
 
     def _create_subscriptions(self) -> None:
-        self.create_subscription(String, "robot_description", self._on_description, LATCHED)
-        self.create_subscription(JointState, "joint_states", self._on_joints, NEWEST)
-        self.create_subscription(Scene, "scene", self._on_scene, LATCHED)
-        self.create_subscription(Grasps, "grasps", self._on_grasps, LATCHED)
-        self.create_subscription(TwistStamped, "object_twist_command", self._on_twist, COMMANDS)
-        self.create_subscription(Bool, "emergency_stop", self._on_emergency, LATCHED)
+        hear = self._diagnostics.subscribe
+        hear(String, "robot_description", self._on_description, LATCHED)
+        hear(JointState, "joint_states", self._on_joints, NEWEST)
+        hear(Scene, "scene", self._on_scene, LATCHED, needed=False)
+        hear(Grasps, "grasps", self._on_grasps, LATCHED, needed=False)
+        hear(TwistStamped, "object_twist_command", self._on_twist, COMMANDS, needed=False)
+        hear(Bool, "emergency_stop", self._on_emergency, LATCHED, needed=False)
         for side in SIDES:
-            self.create_subscription(WrenchStamped, f"wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
+            hear(WrenchStamped, f"wrist_ft/{side}", partial(self._on_wrench, side), NEWEST, needed=False)
             expected = f"expected_grip_wrench/{side}"
             self.create_subscription(WrenchStamped, expected, partial(self._on_expected, side), COMMANDS)
             self._listen_to_tag(gripper_tag(side))
@@ -117,7 +120,15 @@ class BodyControllerNode(Node):
     def _listen_to_tag(self, name: str) -> None:
         if name not in self._tag_topics:
             self._tag_topics.add(name)
-            self.create_subscription(PoseStamped, f"ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
+            hear = self._diagnostics.subscribe
+            hear(PoseStamped, f"ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST, needed=False)
+
+    def _doing(self) -> str:
+        return "moves what it holds" if self._moving else "rests: nothing is commanded"
+
+    def _numbers(self) -> dict[str, object]:
+        share = self._controller.share if self._controller is not None else 0.0
+        return {"holds": ", ".join(grip.object for grip in self._grips.values()), "share of the twist": share}
 
     def _on_description(self, message: String) -> None:
         try:

@@ -25,6 +25,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
 from pbrl_bag.errors import BagError
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.stopping import init_until_signal, spin_until
 from pbrl_control.constraints.belief import ClassBelief
@@ -95,7 +96,8 @@ class PushNode(Node):
         self._scene: Scene | None = None
         self._learned: ObjectModel | None = None
         self._share = 1.0
-        self._phase = ""
+        self._phase = self._failure = ""
+        self._diagnostics = Diagnostics(self, lambda: self._phase, lambda: self._failure)
         self._subscribe()
         if fetch:
             self._subscribe_to_the_floor()
@@ -120,28 +122,30 @@ class PushNode(Node):
         return push, SegmentCourse(push)
 
     def _subscribe(self) -> None:
-        self.create_subscription(Scene, "scene", self._on_scene, LATCHED)
-        self.create_subscription(Grasps, "grasps", self._on_grasps, LATCHED)
-        self.create_subscription(Float64, "body_controller/share", self._on_share, NEWEST)
+        hear = self._diagnostics.subscribe
+        hear(Scene, "scene", self._on_scene, LATCHED)
+        hear(Grasps, "grasps", self._on_grasps, LATCHED)
+        hear(Float64, "body_controller/share", self._on_share, NEWEST, needed=False)
         if self._course is not None or self._sampled is not None:
-            self.create_subscription(ObjectModels, "object_models", self._on_models, LATCHED)
+            hear(ObjectModels, "object_models", self._on_models, LATCHED, needed=False)
         for side in self._hands:
-            self.create_subscription(WrenchStamped, f"wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
+            hear(WrenchStamped, f"wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
         for name in (self._plan.object, *(gripper_tag(side) for side in self._hands)):
             self._listen_to_tag(name)
 
     def _subscribe_to_the_floor(self) -> None:
         """Listen to what driving needs beyond that."""
-        self.create_subscription(String, "robot_description", self._on_description, LATCHED)
-        self.create_subscription(JointState, "joint_states", self._on_joints, NEWEST)
-        self.create_subscription(Odometry, "odom", self._on_odometry, NEWEST)
+        hear = self._diagnostics.subscribe
+        hear(String, "robot_description", self._on_description, LATCHED)
+        hear(JointState, "joint_states", self._on_joints, NEWEST)
+        hear(Odometry, "odom", self._on_odometry, NEWEST)
         for side in SIDES:
             self._listen_to_tag(gripper_tag(side))
 
     def _listen_to_tag(self, name: str) -> None:
         if name not in self._tag_topics:
             self._tag_topics.add(name)
-            self.create_subscription(PoseStamped, f"ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
+            self._diagnostics.subscribe(PoseStamped, f"ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
 
     def _on_description(self, message: String) -> None:
         if self._fetch is not None:
@@ -239,6 +243,7 @@ class PushNode(Node):
             return
         self._phase = command.phase
         failed = command.phase == Phase.FAILED
+        self._failure = f"failed: {command.status}" if failed else ""
         self._status.publish(String(data=f"failed: {command.status}" if failed else str(command.phase)))
         if failed:  # rclpy remembers a severity for each line of code
             self.get_logger().error(f"failed: {command.status}")

@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
 from pbrl_mismatch.effects.registry import EFFECTS
@@ -64,6 +65,7 @@ class MismatchNode(Node):
         memory = declare(self, "memory", MEMORY, "most that is kept of messages for a diagnosis [MB]", (1.0, 100_000.0))
         refuse_unknown(self)
         chosen = DiagnoseOptions(without=tuple(without), workers=workers, seed=seed)
+        self._doing, self._alarms = "watches; no alarm so far", 0
         self._mismatches = self.create_publisher(Mismatches, "mismatches", LATCHED)
         self.listener = RecordingListener("mismatch_node_listener", context, memory, self.get_namespace())
         self._watcher = Watcher(
@@ -74,12 +76,17 @@ class MismatchNode(Node):
             self.get_logger().warning,
             period,
         )
-        self.create_subscription(ObjectModels, "object_models", self._take_models, LATCHED)
+        diagnostics = Diagnostics(self, lambda: self._doing, numbers=self._numbers)
+        self.listener.tell(diagnostics)
+        diagnostics.subscribe(ObjectModels, "object_models", self._take_models, LATCHED)
         # In a group of its own: the answer comes while whoever asked for the experiment is still waiting.
         self._pusher = self.create_client(PushObject, "push", callback_group=ReentrantCallbackGroup())
         self.create_service(Trigger, "run_next_experiment", self._run_next_experiment)
         self._watcher.start()
         self.listener.start()
+
+    def _numbers(self) -> dict[str, object]:
+        return {"objects with an alarm": self._alarms, "messages heard": self.listener.count()}
 
     def _take_models(self, message: ObjectModels) -> None:
         try:
@@ -104,6 +111,8 @@ class MismatchNode(Node):
         return response
 
     def _changed(self, entries: tuple[Found, ...], stamp: float) -> None:
+        self._alarms = len(entries)
+        self._doing = f"alarm: {', '.join(entry.alarm.object for entry in entries)}" if entries else "watches; no alarm"
         self._mismatches.publish(mismatches_to_msg(entries, stamp))
 
     def destroy_node(self) -> None:

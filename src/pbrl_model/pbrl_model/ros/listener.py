@@ -18,7 +18,9 @@ from rclpy.subscription import Subscription
 from pbrl_bag.builder import RecordingBuilder
 from pbrl_bag.errors import BagError
 from pbrl_bag.names import canonical, relative
+from pbrl_bag.roles import GRASPS_TOPIC, SCENE_TOPIC
 from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.types import Recording
 from pbrl_model.ros.heard import Heard, Message
 
@@ -43,7 +45,13 @@ class RecordingListener(Node):
         namespace: of the robot.
     """
 
-    def __init__(self, name: str, context: Context | None = None, memory: float = MEMORY, namespace: str = "/"):
+    def __init__(
+        self,
+        name: str,
+        context: Context | None = None,
+        memory: float = MEMORY,
+        namespace: str = "/",
+    ):
         super().__init__(
             name, context=context, namespace=namespace, start_parameter_services=False, enable_rosout=False
         )
@@ -52,6 +60,7 @@ class RecordingListener(Node):
         self._last: dict[str, tuple[type, bytes]] = {}
         self._subscriptions_by_topic: dict[str, tuple[Subscription, QoSProfile]] = {}
         self._refused: set[str] = set()
+        self._diagnostics: Diagnostics | None = None
         self.create_timer(DISCOVERY_SECONDS, self.discover, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self)
@@ -67,6 +76,12 @@ class RecordingListener(Node):
         if self._thread.is_alive():
             self._thread.join()
         self.destroy_node()
+
+    def tell(self, diagnostics: Diagnostics) -> None:
+        """Keep account of what is heard in a node's diagnostics."""
+        diagnostics.input(SCENE_TOPIC, stream=False)
+        diagnostics.input(GRASPS_TOPIC, stream=False)
+        self._diagnostics = diagnostics
 
     def count(self) -> int:
         """Return how many messages have been heard, forgotten ones too."""
@@ -126,6 +141,8 @@ class RecordingListener(Node):
 
     def _keep(self, topic: str, kind: type, data: bytes) -> None:
         self._last[topic] = (kind, data)
+        if self._diagnostics is not None:  # a robot need not have both wrists, nor push all the time
+            self._diagnostics.input(topic, needed=False).heard()
         for note in self._heard.add(Message(topic, kind, data)):
             self.get_logger().warning(note)
 

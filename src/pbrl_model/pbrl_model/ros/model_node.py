@@ -22,6 +22,7 @@ from visualization_msgs.msg import MarkerArray
 
 from pbrl_bag import read_recording
 from pbrl_bag.errors import BagError
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
 from pbrl_bag.ros.stopping import ended_by_signals
@@ -75,14 +76,29 @@ class ModelNode(Node):
         self._lock = threading.Lock()
         self._stamp = 0.0
         self._published = 0
+        self._worker: OnlineWorker | None = None
         self._models = self.create_publisher(ObjectModels, "object_models", LATCHED)
         self._markers = self.create_publisher(MarkerArray, "object_models/markers", QoSProfile(depth=1))
         self.listener = RecordingListener("model_node_listener", context, memory, self.get_namespace())
+        # In the listener's thread, as this node's own is busy while it answers /learn.
+        self.listener.tell(Diagnostics(self, self._doing, numbers=self._numbers, runs_in=self.listener))
         self.create_service(LearnModel, "learn", self._learn)
         self.create_timer(MARKER_SECONDS, self._draw, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._serve(stored)
-        self._worker = self._start_learning(stored, period) if online else None
+        if online:
+            self._worker = self._start_learning(stored, period)
         self.listener.start()
+
+    def _doing(self) -> str:
+        known = ", ".join(self._posteriors) or "nothing yet"
+        return f"{'learns as it hears' if self._worker is not None else 'learns when asked'}; knows {known}"
+
+    def _numbers(self) -> dict[str, object]:
+        return {
+            "objects": len(self._posteriors),
+            "messages heard": self.listener.count(),
+            "learned up to [s]": self._stamp,
+        }
 
     def _stored(self) -> dict[str, Stored]:
         """Return what is on disk."""

@@ -8,6 +8,7 @@ the model is learned from, and because the same library reads pictures out of re
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
 from pbrl_model.errors import ModelError
@@ -61,18 +63,17 @@ class TagDetectorNode(Node):
         self._places: dict[str, Any] = {}
         self._cameras: dict[str, CameraCalibration] = {}
         self._outputs: dict[str, Any] = {}
-        self.create_subscription(Scene, "scene", self._on_scene, LATCHED)
-        self.create_subscription(TFMessage, "/tf_static", self._on_frames, FRAMES)
+        self._found = 0
+        self._diagnostics = Diagnostics(self, numbers=lambda: {"bodies found": self._found})
+        hear = self._diagnostics.subscribe
+        hear(Scene, "scene", self._on_scene, LATCHED)
+        hear(TFMessage, "/tf_static", self._on_frames, FRAMES)
         reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
         pictures = QoSProfile(depth=2, reliability=reliability)  # a late picture is of no use
         for name in names:
             topic = f"camera/{name}"
-            self.create_subscription(
-                CameraInfo, f"{topic}/camera_info", lambda message, name=name: self._on_info(name, message), pictures
-            )
-            self.create_subscription(
-                Image, f"{topic}/image_raw", lambda message, name=name: self._on_image(name, message), pictures
-            )
+            hear(CameraInfo, f"{topic}/camera_info", partial(self._on_info, name), pictures)
+            hear(Image, f"{topic}/image_raw", partial(self._on_image, name), pictures)
 
     def _on_scene(self, message: Scene) -> None:
         bodies = [body.name for body in message.bodies if body.movable]
@@ -117,6 +118,7 @@ class TagDetectorNode(Node):
         return self._cameras[name]
 
     def _publish(self, stamp: float, readings: list[BodyReading]) -> None:
+        self._found = len(readings)
         for reading in readings:
             if reading.name not in self._outputs:
                 self._outputs[reading.name] = self.create_publisher(PoseStamped, f"ar_tags/{reading.name}/pose", TAGS)

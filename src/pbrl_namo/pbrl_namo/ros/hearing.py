@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from pbrl_bag.names import relative
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_control.errors import ControlError
 from pbrl_control.kinematics import SIDES, Posture
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag
@@ -39,6 +40,7 @@ class Hearing:
 
     Args:
         node: that hears.
+        diagnostics: of the node.
         scene: is told of each /scene.
         odometry: is told when odometry was taken [s], and the pose (3,) of `base` in `odom` [m, rad].
         alive: is told of each sign of life of `JOINT_STATES` and `SHARE`, and when it came on the steady clock [s].
@@ -47,6 +49,7 @@ class Hearing:
     def __init__(
         self,
         node: Node,
+        diagnostics: Diagnostics,
         scene: Callable[[Scene], None],
         odometry: Callable[[float, Array], None],
         alive: Callable[[str, float], None],
@@ -59,13 +62,14 @@ class Hearing:
         self._grips: dict[str, Grip] = {}
         self._bodies: dict[str, BodyShape] = {}
         self._share = 1.0
-        node.create_subscription(Scene, "scene", self._on_scene, LATCHED)
-        node.create_subscription(Grasps, "grasps", self._on_grasps, LATCHED)
-        node.create_subscription(JointState, relative(JOINT_STATES), self._on_joints, NEWEST)
-        node.create_subscription(Odometry, "odom", self._on_odometry, NEWEST)
-        node.create_subscription(Float64, relative(SHARE), self._on_share, NEWEST)
+        hear = self._subscribe = diagnostics.subscribe
+        hear(Scene, "scene", self._on_scene, LATCHED)
+        hear(Grasps, "grasps", self._on_grasps, LATCHED)
+        hear(JointState, relative(JOINT_STATES), self._on_joints, NEWEST)
+        hear(Odometry, "odom", self._on_odometry, NEWEST)
+        hear(Float64, relative(SHARE), self._on_share, NEWEST, needed=False)
         for side in SIDES:
-            node.create_subscription(WrenchStamped, f"wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
+            hear(WrenchStamped, f"wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
             self._listen_to_tag(gripper_tag(side))
 
     def percept(self, now: float) -> Percept:
@@ -78,8 +82,7 @@ class Hearing:
     def _listen_to_tag(self, name: str) -> None:
         if name not in self._tag_topics:
             self._tag_topics.add(name)
-            topic = f"ar_tags/{name}/pose"
-            self._node.create_subscription(PoseStamped, topic, partial(self._on_tag, name), NEWEST)
+            self._subscribe(PoseStamped, f"ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
 
     def _on_scene(self, message: Scene) -> None:
         self._bodies = bodies_from_msg(message)

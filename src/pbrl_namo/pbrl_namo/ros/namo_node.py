@@ -28,6 +28,7 @@ from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from pbrl_bag.names import relative
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
 from pbrl_bag.ros.stopping import spin_in_order
@@ -95,10 +96,11 @@ class NamoNode(Node):
         self._paused = ""
         self._ticked = self._told = -math.inf
         self._drawing = Drawing()
+        diagnostics = Diagnostics(self, self._doing, self._trouble)
         self._live = Liveness((JOINT_STATES, SHARE, GRASP_SERVICE), GONE)
-        self._hearing = Hearing(self, self._on_scene, self._on_odometry, self._live.heard)
-        self.create_subscription(String, "robot_description", self._on_description, LATCHED)
-        self.create_subscription(ObjectModels, "object_models", self._on_models, LATCHED)
+        self._hearing = Hearing(self, diagnostics, self._on_scene, self._on_odometry, self._live.heard)
+        diagnostics.subscribe(String, "robot_description", self._on_description, LATCHED)
+        diagnostics.subscribe(ObjectModels, "object_models", self._on_models, LATCHED, needed=False)
         self._create_outputs()
         self._listener.start()
         self._warming = compile_in_background()
@@ -109,6 +111,17 @@ class NamoNode(Node):
     def thinking(self) -> bool:
         """Whether a job is being answered or kernels are being compiled: those threads cannot be stopped."""
         return self._planned.busy or self._warming.is_alive()
+
+    def _doing(self) -> str:
+        if self._executive is None:
+            return "waits for a goal, /reach_goal or /goal_pose"
+        return f"{self._state or 'begins'}: {self._executive.sentence}"
+
+    def _trouble(self) -> str:
+        if self._paused:
+            return f"rests: {self._paused}"
+        failed = self._executive is not None and self._executive.state == State.FAILED
+        return f"failed: {self._executive.reason}" if failed and self._executive is not None else ""
 
     def destroy_node(self) -> None:
         """Let listener and thinker go with the node."""

@@ -19,6 +19,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import refuse_unknown
 from pbrl_control.cart import (
     CartCommand,
@@ -65,7 +66,8 @@ class CartControllerNode(Node):
         refuse_unknown(self)
         compile_kernels(self._settings)  # before anybody can see this node: who sees it may count on its ticks
         self.tracker = CartTracker()
-        self._hearing = Hearing(self, self.tracker)
+        diagnostics = Diagnostics(self, lambda: self._say.sentence)
+        self._hearing = Hearing(self, diagnostics, self.tracker)
         self._arms: Pr2Arms | None = None
         self._joints: JointState | None = None
         self._costs: CostField | None = None
@@ -77,9 +79,9 @@ class CartControllerNode(Node):
         self._cancelled = False
         self._at = 0.0
         self._create_outputs()
-        self.create_subscription(String, "robot_description", self._on_description, LATCHED)
-        self.create_subscription(JointState, "joint_states", self._on_joints, NEWEST)
-        self.create_subscription(OccupancyGrid, "local_costmap/costmap", self._on_costmap, LATCHED)
+        diagnostics.subscribe(String, "robot_description", self._on_description, LATCHED)
+        diagnostics.subscribe(JointState, "joint_states", self._on_joints, NEWEST)
+        diagnostics.subscribe(OccupancyGrid, "local_costmap/costmap", self._on_costmap, LATCHED)
         self.create_timer(self._settings.period, self._tick)
 
     def _create_outputs(self) -> None:

@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import refuse_unknown
 from pbrl_control.ros.qos import COMMANDS
 from pbrl_planner.cart.leg import ENDED, Drove, Leg, LegState, Order
@@ -74,9 +75,18 @@ class CartNavigatorNode(Node):
             self._cancel,
             lambda why: NavigateCart.Result(success=False, message=why),
         )
-        self.create_subscription(PoseStamped, "goal_pose", self._on_goal_pose, COMMANDS)
+        diagnostics = Diagnostics(self, lambda: self._say.sentence, self._trouble, self._numbers)
+        diagnostics.subscribe(PoseStamped, "goal_pose", self._on_goal_pose, COMMANDS, needed=False)
         self.create_timer(TICK, self._tick)
         self._say = Saying(self, "cart_navigator/status", "waiting for a goal on /goal_pose")
+
+    def _trouble(self) -> str:
+        if not self._planner.server_is_ready():
+            return NO_PLANNER
+        return "" if self._driver.server_is_ready() else NO_CONTROLLER
+
+    def _numbers(self) -> dict[str, object]:
+        return {"epsilon of the plan": self._epsilon, "remaining [s]": self._remaining}
 
     def destroy_node(self) -> None:
         """Leave the graph."""

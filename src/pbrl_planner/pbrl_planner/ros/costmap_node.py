@@ -18,6 +18,7 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_control.planar import Array, compose
 from pbrl_control.ros.qos import LATCHED, NEWEST
@@ -47,14 +48,16 @@ class CostmapNode(Node):
         refuse_unknown(self)
         self.tracker, self._frames = CartTracker(), Frames()
         self._static: StaticMap | None = None
+        self._left_aside = ""
         self._local = Costmap(self._settings.local_costmap)
         self._global: Costmap | None = None
         self._local_out = self.create_publisher(OccupancyGrid, "local_costmap/costmap", LATCHED)
         self._global_out = self.create_publisher(OccupancyGrid, "global_costmap/costmap", LATCHED)
-        self._hearing = Hearing(self, self.tracker, self._begin_again)
-        self.create_subscription(TFMessage, "/tf_static", self._frames.hear, STATIC)
-        self.create_subscription(OccupancyGrid, "map", self._on_map, LATCHED)
-        self.create_subscription(LaserScan, "scan", self._on_scan, NEWEST)
+        diagnostics = Diagnostics(self, lambda: self._left_aside)
+        self._hearing = Hearing(self, diagnostics, self.tracker, self._begin_again)
+        diagnostics.subscribe(TFMessage, "/tf_static", self._frames.hear, STATIC)
+        diagnostics.subscribe(OccupancyGrid, "map", self._on_map, LATCHED)
+        diagnostics.subscribe(LaserScan, "scan", self._on_scan, NEWEST)
         self.create_service(Trigger, "costmaps/clear", self._clear)
         self.create_service(Trigger, "costmaps/forget_unseen", self._forget_unseen)
         self.create_timer(1.0 / rate, self._tell_global)
@@ -88,8 +91,10 @@ class CostmapNode(Node):
                 if costs is not None:
                     costs.observe(scan, laser, own)
         except PlannerError as error:
+            self._left_aside = f"a scan was left aside: {error}"
             self.get_logger().warning(f"left aside: {error}", throttle_duration_sec=SAID)
             return
+        self._left_aside = ""
         self._local_out.publish(field_to_msg(self._field(self._local, scan.time, own)))
 
     def _wanting(self) -> str:

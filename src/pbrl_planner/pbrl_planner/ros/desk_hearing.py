@@ -15,6 +15,7 @@ from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_control.ball_arm import JOINTS, BallArm, Strokes
 from pbrl_control.errors import ControlError
 from pbrl_control.planar import Array
@@ -44,6 +45,7 @@ class DeskHearing:
 
     Args:
         node: that hears.
+        diagnostics: of the node.
         camera: name of the overhead camera; empty: poses are heard on `/ar_tags/<item>/pose`.
         look: is called with the time of a look and the poses (3,) of the items that were found, by name.
 
@@ -52,7 +54,7 @@ class DeskHearing:
         heard: when that was, by the node's clock [s].
     """
 
-    def __init__(self, node: Node, camera: str, look: Look) -> None:
+    def __init__(self, node: Node, diagnostics: Diagnostics, camera: str, look: Look) -> None:
         self._node, self._camera, self._look = node, camera, look
         self.joints: Array | None = None
         self.heard = -math.inf
@@ -65,13 +67,14 @@ class DeskHearing:
         self._finder: ItemFinder | None = None
         self._seen: dict[str, Array] = {}
         self._stamps: dict[str, float] = {}
-        node.create_subscription(String, "robot_description", self._on_description, LATCHED)
-        node.create_subscription(Scene, "scene", self._on_scene, LATCHED)
-        node.create_subscription(TFMessage, "/tf_static", self._on_frames, FRAMES)
-        node.create_subscription(JointState, "joint_states", self._on_joints, NEWEST)
+        hear = self._subscribe = diagnostics.subscribe
+        hear(String, "robot_description", self._on_description, LATCHED)
+        hear(Scene, "scene", self._on_scene, LATCHED)
+        hear(TFMessage, "/tf_static", self._on_frames, FRAMES)
+        hear(JointState, "joint_states", self._on_joints, NEWEST)
         if camera:
-            node.create_subscription(CameraInfo, f"camera/{camera}/camera_info", self._on_info, PICTURES)
-            node.create_subscription(Image, f"camera/{camera}/image_raw", self._on_image, PICTURES)
+            hear(CameraInfo, f"camera/{camera}/camera_info", self._on_info, PICTURES)
+            hear(Image, f"camera/{camera}/image_raw", self._on_image, PICTURES)
 
     def missing(self) -> str:
         """Return what was not heard yet, in words; empty where everything was."""
@@ -125,7 +128,7 @@ class DeskHearing:
             for body in message.bodies:
                 if body.movable:
                     topic = f"ar_tags/{body.name}/pose"
-                    self._node.create_subscription(PoseStamped, topic, partial(self._on_pose, body.name), PICTURES)
+                    self._subscribe(PoseStamped, topic, partial(self._on_pose, body.name), PICTURES)
 
     def _on_frames(self, message: TFMessage) -> None:
         for transform in message.transforms:

@@ -12,6 +12,7 @@ from pbrl_msgs.msg import Grasps, Scene
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_control.ros.conversions import seconds
 from pbrl_control.ros.qos import LATCHED
 from pbrl_planner.cart.tracker import SOURCES, CartTracker
@@ -30,18 +31,22 @@ class Hearing:
 
     Args:
         node: that hears.
+        diagnostics: of the node.
         tracker: is told.
         again: is called when the clock of odometry has begun again.
     """
 
-    def __init__(self, node: Node, tracker: CartTracker, again: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self, node: Node, diagnostics: Diagnostics, tracker: CartTracker, again: Callable[[], None] = lambda: None
+    ) -> None:
         self._node, self._tracker, self._again = node, tracker, again
-        node.create_subscription(Odometry, "odom", self._on_odometry, STREAM)
-        node.create_subscription(PoseWithCovarianceStamped, "amcl_pose", self._on_pose, STREAM)
-        node.create_subscription(Scene, "scene", self._on_scene, LATCHED)
-        node.create_subscription(Grasps, "grasps", self._on_grasps, LATCHED)
-        for source in SOURCES:
-            node.create_subscription(PoseStamped, f"cart_pose/{source}", partial(self._on_cart, source), STREAM)
+        hear = diagnostics.subscribe
+        hear(Odometry, "odom", self._on_odometry, STREAM)
+        hear(PoseWithCovarianceStamped, "amcl_pose", self._on_pose, STREAM)
+        hear(Scene, "scene", self._on_scene, LATCHED)
+        hear(Grasps, "grasps", self._on_grasps, LATCHED)
+        for source in SOURCES:  # one of them will do
+            hear(PoseStamped, f"cart_pose/{source}", partial(self._on_cart, source), STREAM, needed=False)
 
     def _on_odometry(self, message: Odometry) -> None:
         try:

@@ -21,6 +21,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from visualization_msgs.msg import MarkerArray
 
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_control.planar import Array
 from pbrl_control.ros.qos import COMMANDS, LATCHED
@@ -57,7 +58,8 @@ class LatticePlannerNode(Node):
         self._coarse: bool = declare(self, "coarse", False, text)
         refuse_unknown(self)
         self.tracker = CartTracker()
-        self._hearing = Hearing(self, self.tracker)
+        diagnostics = Diagnostics(self, lambda: self._last, numbers=lambda: {"plans": self._plans})
+        self._hearing = Hearing(self, diagnostics, self.tracker)
         self._field: CostField | None = None
         self._thread = ThreadPoolExecutor(1)
         self._work: Future[Reply] | None = None
@@ -65,9 +67,10 @@ class LatticePlannerNode(Node):
         self._news: SimpleQueue[LatticePlan] = SimpleQueue()
         self._unwanted = False
         self._asked = 0.0
+        self._last, self._plans = "waits for a goal on /plan_cart_path", 0
         self._plan_out = self.create_publisher(PathMsg, "plan", LATCHED)
         self._markers = self.create_publisher(MarkerArray, "markers", COMMANDS)
-        self.create_subscription(OccupancyGrid, "global_costmap/costmap", self._on_costmap, LATCHED)
+        diagnostics.subscribe(OccupancyGrid, "global_costmap/costmap", self._on_costmap, LATCHED)
         self._prepared: Future[object] | None = None
         self._looks = self.create_timer(1.0 / LOOKS, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._looks.cancel()
@@ -197,7 +200,9 @@ class LatticePlannerNode(Node):
             self._plan_out.publish(result.path.path)
             if self.tracker.body is not None:
                 self._markers.publish(swept(self.tracker.body, reply.poses, result.path.path.header.stamp))
-        self.get_logger().info(f"{reply.outcome.name.lower().replace('_', ' ')} after {spent:.2f} s: {reply.message}")
+        self._last = f"{reply.outcome.name.lower().replace('_', ' ')} after {spent:.2f} s: {reply.message}"
+        self._plans += reply.plan is not None
+        self.get_logger().info(self._last)
         self._goals.end(result, reply.outcome is Outcome.FOUND)
 
 

@@ -19,10 +19,14 @@ class Saying:
         node: that says it.
         topic: std_msgs/String, for late subscribers, too.
         first: sentence.
+
+    Attributes:
+        sentence: the last one, with its numbers.
     """
 
     def __init__(self, node: Node, topic: str, first: str) -> None:
         self._node, self._said = node, ""
+        self.sentence = ""
         self._out = node.create_publisher(String, topic, LATCHED)
         self(first)
 
@@ -32,6 +36,7 @@ class Saying:
 
     def __call__(self, sentence: str) -> None:
         """Say a sentence, if it is new."""
+        self.sentence = sentence
         if self.is_new(sentence):
             self._said = NUMBERS.sub("", sentence)
             self._out.publish(String(data=sentence))

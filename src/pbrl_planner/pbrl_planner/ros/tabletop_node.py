@@ -20,6 +20,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 from visualization_msgs.msg import MarkerArray
 
+from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_control.planar import Array
 from pbrl_control.ros.qos import COMMANDS
@@ -84,7 +85,8 @@ class TabletopNode(Node):
         self._thought: Future[NextPush | Ended] | None = None
         self._thinker = ThreadPoolExecutor(1)
         self._executive: DeskExecutive | None = None
-        self._hearing = DeskHearing(self, camera, self._on_look)
+        diagnostics = Diagnostics(self, lambda: self._say.sentence)
+        self._hearing = DeskHearing(self, diagnostics, camera, self._on_look)
         self._arm = self.create_publisher(Float64MultiArray, OUTPUT, COMMANDS)
         self._drawing = self.create_publisher(MarkerArray, "markers", COMMANDS)
         self._goals = OneGoal(
