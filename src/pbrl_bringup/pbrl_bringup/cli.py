@@ -128,6 +128,10 @@ def diagnose(
     without: Annotated[
         list[str] | None, typer.Option(help="An effect that the library does without, as often as needed.")
     ] = None,
+    effects: Annotated[
+        list[Path] | None,
+        typer.Option(help="Python file that adds effects of one's own (docs/mismatch.md), as often as needed."),
+    ] = None,
     mass_spread: Annotated[
         float | None,
         typer.Option(help="How well the mass that was told is known: 0.2 is to 20 %. Default: 0.1."),
@@ -153,6 +157,7 @@ def diagnose(
         out=out,
         baseline=baseline or [],
         without=without or [],
+        effects=effects or [],
         known={"mass_spread": mass_spread, "grasp_spread": grasp_spread, "outline_spread": outline_spread},
         seed=seed,
         workers=workers,
