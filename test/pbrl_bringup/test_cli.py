@@ -14,7 +14,10 @@ import pytest
 from pbrl_bringup.cli import app, run_arguments
 
 MakeBag = Callable[..., Path]
-NAMED = ["demo", "test", "fit", "diagnose", "simulate", "run", "record", "play", "info", "map", "bench", "experiment"]
+NAMED = [
+    *("demo", "test", "fit", "diagnose", "simulate", "run", "record", "play", "info", "map"),
+    *("export", "bench", "experiment"),
+]
 COMMANDS = sorted(command.name or command.callback.__name__ for command in app.registered_commands if command.callback)
 
 

@@ -18,7 +18,7 @@ from typing import Annotated, Any
 import typer
 from typer.exceptions import TyperException
 
-from pbrl_bringup.cli_options import Bag, Domain, Engine, Likelihood, Many, Mapping, Out, Sampler, Seed
+from pbrl_bringup.cli_options import Bag, Domain, Engine, Form, Likelihood, Many, Mapping, Out, Sampler, Seed
 
 # Errors whose message is for the person at the keyboard. Named, not imported: an error can only have
 # been raised by a module that is loaded, and loading all of them would slow every start.
@@ -225,6 +225,22 @@ def map_bag(
 ) -> int:
     """Propose which stream of a foreign bag plays which role, with reasons, as a mapping file."""
     return _hand_over("map", bag=bag, out=out, sizes=size or [])
+
+
+@app.command(epilog="Example: ./pbrl export out/fit --format urdf --out out/table.urdf")
+def export(
+    model: Annotated[Path, typer.Argument(help="model_NAME.json, or the folder of a fit or a diagnosis.")],
+    form: Annotated[
+        Form, typer.Option("--format", help="urdf, sdf, json (with its schema beside it) or netcdf (ArviZ).")
+    ] = Form.JSON,
+    out: Annotated[Path | None, typer.Option(help="File to write. Default: the object's name, here.")] = None,
+    height: Annotated[
+        float, typer.Option(min=0.05, max=100.0, help="Of the body [m], for urdf and sdf; pushing does not tell it.")
+    ] = 0.75,
+    only: Annotated[str | None, typer.Option("--object", help="Which one, where a folder has several.")] = None,
+) -> int:
+    """Write a learned object in the words of other stacks: inertia, friction, and how sure they are."""
+    return _hand_over("export", model=model, form=str(form), out=out, height=height, only=only)
 
 
 @app.command(epilog="Example: ./pbrl bench wheel --quick")
