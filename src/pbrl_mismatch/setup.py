@@ -17,6 +17,7 @@ setup(
     install_requires=[
         "pbrl_bag",
         "pbrl_model",
+        "llvmlite>=0.43",
         "numba>=0.60",
         "numpy>=1.26",
         "pydantic>=2.6",

@@ -8,7 +8,7 @@ setup(
     description="The world model: pymunk world, compiled kernel, priors, likelihood, inference; model_node.",
     license="BSD-3-Clause",
     packages=find_packages(),
-    package_data={NAME: ["py.typed"]},
+    package_data={NAME: ["py.typed", "*.json"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

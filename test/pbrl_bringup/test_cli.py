@@ -15,19 +15,8 @@ from pbrl_bringup.cli import app, run_arguments
 
 MakeBag = Callable[..., Path]
 NAMED = [
-    "demo",
-    "test",
-    "fit",
-    "diagnose",
-    "simulate",
-    "run",
-    "record",
-    "play",
-    "info",
-    "map",
-    "view",
-    "bench",
-    "experiment",
+    *("demo", "test", "fit", "diagnose", "simulate", "run", "record", "play", "info", "map"),
+    *("view", "export", "bench", "experiment"),
 ]
 COMMANDS = sorted(command.name or command.callback.__name__ for command in app.registered_commands if command.callback)
 

@@ -25,7 +25,7 @@ def test_the_names_are_the_contract_s() -> None:
 
 
 def test_a_row_begins_as_the_world_model_s_row() -> None:
-    assert COLUMNS[: len(KERNEL_COLUMNS)] == KERNEL_COLUMNS
+    assert tuple(COLUMNS[: len(KERNEL_COLUMNS)]) == KERNEL_COLUMNS
     assert len(set(COLUMNS)) == len(COLUMNS) == len(UNIT) == len(neutral_row())
 
 

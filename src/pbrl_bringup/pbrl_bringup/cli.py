@@ -17,7 +17,7 @@ import typer
 from typer.exceptions import TyperException
 
 from pbrl_bringup.cli_errors import complain, complain_of
-from pbrl_bringup.cli_options import Bag, Domain, Engine, Likelihood, Many, Mapping, Namespace, Out, Sampler, Seed
+from pbrl_bringup.cli_options import Bag, Domain, Engine, Form, Likelihood, Many, Mapping, Namespace, Out, Sampler, Seed
 
 STOPPED = 130  # what Ctrl-C ends with; typer itself turns it into this code
 
@@ -114,6 +114,10 @@ def diagnose(
     without: Annotated[
         list[str] | None, typer.Option(help="An effect that the library does without, as often as needed.")
     ] = None,
+    effects: Annotated[
+        list[Path] | None,
+        typer.Option(help="Python file that adds effects of one's own (docs/mismatch.md), as often as needed."),
+    ] = None,
     mass_spread: Annotated[
         float | None,
         typer.Option(help="How well the mass that was told is known: 0.2 is to 20 %. Default: 0.1."),
@@ -139,6 +143,7 @@ def diagnose(
         out=out,
         baseline=baseline or [],
         without=without or [],
+        effects=effects or [],
         known={"mass_spread": mass_spread, "grasp_spread": grasp_spread, "outline_spread": outline_spread},
         seed=seed,
         workers=workers,
@@ -239,6 +244,22 @@ def map_bag(
 ) -> int:
     """Propose which stream of a foreign bag plays which role, with reasons, as a mapping file."""
     return _hand_over("map", bag=bag, out=out, sizes=size or [])
+
+
+@app.command(epilog="Example: ./pbrl export out/fit --format urdf --out out/table.urdf")
+def export(
+    model: Annotated[Path, typer.Argument(help="model_NAME.json, or the folder of a fit or a diagnosis.")],
+    form: Annotated[
+        Form, typer.Option("--format", help="urdf, sdf, json (with its schema beside it) or netcdf (ArviZ).")
+    ] = Form.JSON,
+    out: Annotated[Path | None, typer.Option(help="File to write. Default: the object's name, here.")] = None,
+    height: Annotated[
+        float, typer.Option(min=0.05, max=100.0, help="Of the body [m], for urdf and sdf; pushing does not tell it.")
+    ] = 0.75,
+    only: Annotated[str | None, typer.Option("--object", help="Which one, where a folder has several.")] = None,
+) -> int:
+    """Write a learned object in the words of other stacks: inertia, friction, and how sure they are."""
+    return _hand_over("export", model=model, form=str(form), out=out, height=height, only=only)
 
 
 @app.command(epilog="Example: ./pbrl bench wheel --quick")

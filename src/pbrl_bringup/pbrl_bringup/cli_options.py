@@ -31,6 +31,15 @@ class Engine(StrEnum):
     PYMUNK = "pymunk"
 
 
+class Form(StrEnum):
+    """Forms of `export`."""
+
+    URDF = "urdf"
+    SDF = "sdf"
+    JSON = "json"
+    NETCDF = "netcdf"
+
+
 Seed = Annotated[int, typer.Option(min=0, help="Seed of every random draw; the same seed gives the same result.")]
 Out = Annotated[Path, typer.Option(help="Folder for the results.")]
 Bag = Annotated[Path, typer.Argument(help="Bag folder, .mcap, .db3 or .bag file, or .csv with --map.")]

@@ -2,6 +2,8 @@
 
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
 from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis, diagnose, track_of
+from pbrl_mismatch.effects.effect import Scene
+from pbrl_mismatch.effects.own import OwnEffect, Prior, forget_effect, own_effects, register_effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.encounter import Encounter, find_encounter
 from pbrl_mismatch.errors import MismatchError
@@ -14,9 +16,15 @@ __all__ = [
     "Encounter",
     "MismatchError",
     "ObjectDiagnosis",
+    "OwnEffect",
+    "Prior",
     "ResidualWrench",
+    "Scene",
     "diagnose",
     "find_encounter",
+    "forget_effect",
+    "own_effects",
+    "register_effect",
     "residual_wrench",
     "track_of",
 ]

@@ -12,7 +12,8 @@ import numpy as np
 
 from pbrl_model.arviz_import import az
 from pbrl_model.errors import ModelError
-from pbrl_model.model_file import load_model, posterior_of
+from pbrl_model.model_file import FORMAT as MODEL_FORMAT
+from pbrl_model.model_file import IN_OUR_TERMS, SavedModel, load_model, posterior_of
 from pbrl_model.parameters import KERNEL_COLUMNS, UNITS, BodyParameters
 from pbrl_model.posterior import Posterior
 
@@ -81,10 +82,36 @@ def save_posterior(posterior: Posterior, path: Path) -> None:
     Raises:
         ModelError: it cannot be written.
     """
+    _write(to_inference_data(posterior), path)
+
+
+def save_model_draws(model: SavedModel, path: Path) -> None:
+    """Write the draws of a model's file as netCDF: as `save_posterior` where it has no effect of its own.
+
+    Of others every parameter is a variable with its unit, those of effects too, for ArviZ; `load_posterior` says that
+    they cannot be simulated.
+
+    Raises:
+        ModelError: it cannot be written.
+    """
+    if all(name in IN_OUR_TERMS for name in model.names):
+        save_posterior(posterior_of(model), path)
+        return
+    parameters = model.all_parameters()
+    data = az().from_dict(posterior={name: np.array(each.draws)[None] for name, each in parameters.items()})
+    group = data["posterior"]
+    for name, each in parameters.items():
+        group[name].attrs["units"] = each.unit
+    group.attrs.update({"format": MODEL_FORMAT, "object": model.object, "effects": json.dumps(model.names)})
+    group.attrs.update({"fixed": json.dumps(model.all_fixed()), "notes": json.dumps(model.notes)})
+    _write(data, path)
+
+
+def _write(data: Any, path: Path) -> None:
     unfinished = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        to_inference_data(posterior).to_netcdf(str(unfinished))
+        data.to_netcdf(str(unfinished))
         unfinished.replace(path)
     except OSError as error:
         raise ModelError(f"{path}: expected to write a posterior there, got {' '.join(str(error).split())}") from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from pbrl_bringup.diagnosis.residuals import RESIDUALS, residuals_to_json
 from pbrl_bringup.files import result_folder, write_json
 from pbrl_bringup.terminal import output, say, table
 from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis, diagnose
+from pbrl_mismatch.effects.own_file import load_effects
 from pbrl_mismatch.joint.diagnosis import is_for_doors
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.told_baseline import is_model_file
@@ -31,6 +32,7 @@ def command(
     out: Path,
     baseline: list[str],
     without: list[str],
+    effects: Sequence[Path],
     known: Mapping[str, float | None],
     seed: int,
     workers: int,
@@ -43,6 +45,7 @@ def command(
         out: folder for the results.
         baseline: kinds of body, and models' files.
         without: effects that the library does without.
+        effects: Python files that add effects to it.
         known: how well things are known, by option; None: the default.
         seed: of every draw.
         workers: threads.
@@ -53,6 +56,8 @@ def command(
         MismatchError: an option does not fit.
         BringupError: the results cannot be written.
     """
+    for path in effects:
+        say(f"pbrl: {path} adds {', '.join(load_effects(path))}")
     kinds = tuple(each for each in baseline if not is_model_file(each))
     asked: dict[str, Any] = {"baseline": kinds} if kinds else {}
     asked["models"] = tuple(Path(each) for each in baseline if is_model_file(each))

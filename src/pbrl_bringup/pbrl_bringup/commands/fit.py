@@ -18,7 +18,9 @@ from pbrl_bringup.report_data import Report
 from pbrl_bringup.report_page import number, rounded, write_page
 from pbrl_bringup.terminal import output, say, table
 from pbrl_model.arviz_bridge import save_posterior
+from pbrl_model.fitted_model import fitted_model
 from pbrl_model.fitting.fit import Fit, FitOptions, fit_recording
+from pbrl_model.model_file import save_model
 from pbrl_model.prior_options import load_prior_options
 
 
@@ -55,6 +57,8 @@ def command(
         report = fit_report(recording, fit, seed, "./pbrl " + shlex.join(sys.argv[1:]))
         for name, found in fit.objects.items():
             save_posterior(found.posterior, folder / f"posterior_{name}.nc")
+            kept = fitted_model(np.random.default_rng(seed), found, recording.bodies[name])
+            save_model(kept, folder / f"model_{name}.json")
         write_json(folder / "report.json", fit.to_report())
         write_page(report, folder / "report.html")
     print_fit(fit, report)

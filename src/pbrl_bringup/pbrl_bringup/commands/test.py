@@ -11,7 +11,7 @@ from pathlib import Path
 from pbrl_bringup.paths import workspace
 from pbrl_bringup.terminal import say
 
-CHECKED = ("src", "test")
+CHECKED = ("src", "test", "examples")
 MOST = 4
 """Files of tests that are run at once."""
 

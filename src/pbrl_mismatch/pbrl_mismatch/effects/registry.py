@@ -56,8 +56,26 @@ _MODULES = (
     pose_bias,
 )
 
-EFFECTS: Mapping[str, Effect] = MappingProxyType({module.EFFECT.name: module.EFFECT for module in _MODULES})
-"""Effect by name."""
+_EFFECTS = {module.EFFECT.name: module.EFFECT for module in _MODULES}
+CONTRACT = tuple(_EFFECTS)
+"""Names of the library's own effects."""
+EFFECTS: Mapping[str, Effect] = MappingProxyType(_EFFECTS)
+"""Effect by name, those that a user added last."""
+
+
+def put(effect: Effect) -> None:
+    """Add an effect to the library; one of the same name that a user added before is replaced."""
+    if effect.name in CONTRACT:
+        raise MismatchError(f"effect: expected a name that the library does not have yet, got {effect.name!r}")
+    _EFFECTS[effect.name] = effect
+
+
+def take_out(name: str) -> None:
+    """Take an effect out of the library that a user added."""
+    if name in CONTRACT or name not in _EFFECTS:
+        added = ", ".join(each for each in _EFFECTS if each not in CONTRACT) or "none was"
+        raise MismatchError(f"effect: expected one that was added ({added}), got {name!r}")
+    del _EFFECTS[name]
 
 
 def effect_named(name: str) -> Effect:

@@ -7,15 +7,19 @@ does. A `mu_y` or `wheel2_mu_y` below zero stands for one that is the same as th
 `torque_scale` below zero for one that is the same as `force_scale`. `load_x`, `load_y` are where the feet's load is
 centred, off their middle; a force at the height `load_height` over the floor moves it on. `payload_gone` 1 stands for
 a load that is there from the start and is taken off.
+
+The last `SPARE` columns are for laws that a user adds: `name_columns` gives some of them names and units.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_mismatch.errors import MismatchError
 from pbrl_model.parameters import KERNEL_COLUMNS, UNITS
 
 Array = NDArray[np.float64]
@@ -118,21 +122,66 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("grip_play", "m", 0.0),
 )
 
-COLUMNS: tuple[str, ...] = (*KERNEL_COLUMNS, *(name for name, _, _ in _EFFECT_COLUMNS))
+SPARE = 32
+"""Columns that no law of the library reads."""
+FIRST_SPARE = len(KERNEL_COLUMNS) + len(_EFFECT_COLUMNS)
+"""Where they begin."""
+COLUMNS: list[str] = [
+    *KERNEL_COLUMNS,
+    *(name for name, _, _ in _EFFECT_COLUMNS),
+    *(f"spare_{k}" for k in range(SPARE)),
+]
 """Names of the columns of a parameter row, in order."""
 COLUMN: dict[str, int] = {name: k for k, name in enumerate(COLUMNS)}
 """Where each name stands."""
-UNIT: dict[str, str] = {**UNITS, **{name: unit for name, unit, _ in _EFFECT_COLUMNS}}
+UNIT: dict[str, str] = {
+    **UNITS,
+    **{name: unit for name, unit, _ in _EFFECT_COLUMNS},
+    **dict.fromkeys(COLUMNS[FIRST_SPARE:], "1"),
+}
 """Unit of each column."""
 WIDTH = len(COLUMNS)
 """Length of a parameter row."""
 
 _BASE_OFF = {"mass": 1.0, "hinge_radius": math.nan}
+_NEUTRAL = np.array(
+    [_BASE_OFF.get(name, 0.0) for name in KERNEL_COLUMNS] + [off for _, _, off in _EFFECT_COLUMNS] + [0.0] * SPARE
+)
 
 
 def neutral_row() -> Array:
     """Return a (WIDTH,) row of a kilogram that slides freely: no wheel, no hinge, every effect off."""
-    values = {name: _BASE_OFF.get(name, 0.0) for name in KERNEL_COLUMNS} | {
-        name: off for name, _, off in _EFFECT_COLUMNS
-    }
-    return np.array([values[name] for name in COLUMNS])
+    return _NEUTRAL.copy()
+
+
+def name_columns(units: Mapping[str, str]) -> int:
+    """Give names and units to spare columns that lie side by side; return where the first of them stands.
+
+    Raises:
+        MismatchError: a name is taken, or so many columns are not left.
+    """
+    taken = [name for name in units if name in COLUMN]
+    if taken:
+        raise MismatchError(f"columns: expected names that no column has yet, got {', '.join(taken)}")
+    free = [COLUMNS[k] == f"spare_{k - FIRST_SPARE}" for k in range(FIRST_SPARE, WIDTH)]
+    first = next((k for k in range(SPARE - len(units) + 1) if all(free[k : k + len(units)])), None)
+    if first is None:
+        raise MismatchError(f"columns: expected at most {sum(free)} more side by side, got {len(units)}")
+    for k, (name, unit) in enumerate(units.items(), FIRST_SPARE + first):
+        _rename(k, name, unit)
+    return FIRST_SPARE + first
+
+
+def forget_columns(names: tuple[str, ...]) -> None:
+    """Make columns spare again that `name_columns` gave names to."""
+    for name in names:
+        k = COLUMN[name]
+        if k < FIRST_SPARE:
+            raise MismatchError(f"columns: expected some that were added, got {name!r}")
+        _rename(k, f"spare_{k - FIRST_SPARE}", "1")
+
+
+def _rename(k: int, name: str, unit: str) -> None:
+    old = COLUMNS[k]
+    del COLUMN[old], UNIT[old]
+    COLUMNS[k], COLUMN[name], UNIT[name] = name, k, unit

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP, SETTLING, push, resist
+from pbrl_mismatch.kernels.own_kernel import how_many, own_laws
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
 from pbrl_model.kernel import GRAVITY
 
@@ -117,6 +118,8 @@ def springs(
         ax, ay = p[at.SLOSH_X] - com[0], p[at.SLOSH_Y] - com[1]
         fx, fy = k * state[SLOSH] + d * state[SLOSH + 2], k * state[SLOSH + 1] + d * state[SLOSH + 3]
         push(acc, c * ax - s * ay, s * ax + c * ay, fx, fy)
+    if how_many() > 0:
+        own_laws(p, state, c, s, time, com, acc)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_mismatch.effects.registry import effect_named
 from pbrl_mismatch.kernels.columns import COLUMN, UNIT, neutral_row
 
 Array = NDArray[np.float64]
@@ -52,7 +53,12 @@ _NEUTRAL = neutral_row()
 
 def strength_columns(effect: str, free: Sequence[str]) -> tuple[str, ...]:
     """Return which of a variant's free columns make it strong."""
-    return tuple(column for column in STRENGTHS[effect] if column in free)
+    return tuple(column for column in _strengths(effect) if column in free)
+
+
+def _strengths(effect: str) -> tuple[str, ...]:
+    """Return the strengths of an effect; of one that a user added, what its wrench is proportional to."""
+    return STRENGTHS[effect] if effect in STRENGTHS else effect_named(effect).linear
 
 
 def scaled(rows: Array, columns: Sequence[str], factor: Array) -> Array:
@@ -67,7 +73,7 @@ def scaled(rows: Array, columns: Sequence[str], factor: Array) -> Array:
 
 def without_others(rows: Array, effect: str) -> Array:
     """Return rows (P, WIDTH) in which the strengths of other effects, which an effect's law may hold too, are off."""
-    own, out = STRENGTHS[effect], rows.copy()
+    own, out = _strengths(effect), rows.copy()
     for columns in STRENGTHS.values():
         for column in columns:
             if column not in own:

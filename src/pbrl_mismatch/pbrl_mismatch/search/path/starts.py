@@ -26,13 +26,8 @@ Array = NDArray[np.float64]
 
 BENT = BELIEVED | {"mu_x", "mu_y"}
 """Columns of a ground that bend to what it lacks: half of the starts have them as they were believed to be."""
-PLACES = frozenset(
-    column
-    for effect in EFFECTS.values()
-    for column in (*(effect.place or ()), *(effect.touches or ()), *effect.pulls, *(effect.region or ()))
-)
-KEPT = (PLACES | {"wheel_x", "wheel_y", "wheel_theta", "hinge_x", "hinge_y", "hinge_radius"}) - BENT
-"""Columns of a ground that every start has as the ground has them: where something is was hard to find."""
+FOUND = frozenset({"wheel_x", "wheel_y", "wheel_theta", "hinge_x", "hinge_y", "hinge_radius"})
+"""Columns of a ground's kind that were hard to find."""
 PARENTS, NEARBY = 3, 0.15
 """Of the draws of each half so many are drawn about again; how far, in standard deviations of the prior."""
 BEGUN, CLIMBED = 3, 5
@@ -88,7 +83,7 @@ def _drawn(
     options: DiagnoseOptions,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return draws (n, K), and which of them have the ground's own columns as they were believed to be (n,)."""
-    track, lacks, columns = ground.cuts.track, ground.lacks, hypothesis.columns
+    track, lacks, columns, kept = ground.cuts.track, ground.lacks, hypothesis.columns, _kept()
     count = max(options.draws * len(_searched(effect, variant)) // 3, 2)
     draws = hypothesis.sample_prior(rng, max(count // 4, 8) if effect.remembers else count)
     afresh = np.arange(len(draws)) % 2 == 1
@@ -96,7 +91,7 @@ def _drawn(
         if column in base.hypothesis.columns:
             # What an effect did, the ground has taken on as far as it could: half begin at what was believed before.
             draws[:, k] = np.where(
-                afresh & (column not in KEPT),
+                afresh & (column not in kept),
                 hypothesis.mean[k] if column in BENT else draws[:, k],
                 ground.coordinates[base.hypothesis.columns.index(column)],
             )
@@ -121,6 +116,16 @@ def _drawn(
         frequency, phase = (columns.index(name) for name in effect.rhythm)
         draws = with_rhythms(rng, draws, frequency, phase, lacks, track.gyration)
     return draws, afresh
+
+
+def _kept() -> frozenset[str]:
+    """Return columns of a ground that every start has as the ground has them: where something is was hard to find."""
+    places = (
+        column
+        for effect in EFFECTS.values()
+        for column in (*(effect.place or ()), *(effect.touches or ()), *effect.pulls, *(effect.region or ()))
+    )
+    return FOUND.union(places) - BENT
 
 
 def _believed_row(base: Fitted, ground: Ground) -> Array:

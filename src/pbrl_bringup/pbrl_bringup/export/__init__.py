@@ -1,0 +1,1 @@
+"""A learned object in the words of other stacks: URDF, SDF, JSON with its schema, ArviZ netCDF."""
