@@ -58,7 +58,7 @@ function makePlots(parent, data, streams, { span, set, zoomed, kept }) {
     const found = streams.curve(what.kind, what.i, shown[0], shown[1]), x = X(box);
     const Y = plotAxes(svg, box, limits(found, what.columns), what.title, what.unit), bottom = box.height - box.bottom;
     const key = element(svg, "text", { x: width - box.right - 44, y: 13, "text-anchor": "end" });
-    what.names.forEach((name, k) => element(key, "tspan", { class: `key${k}`, dx: 8 }, name));
+    if (what.names.length > 1) what.names.forEach((name, k) => element(key, "tspan", { class: `key${k}`, dx: 8 }, name));
     if (what.note) element(svg, "title", {}, what.note);
     if (last) timeAxis(svg, x, shown[0], shown[1], bottom, Math.max(4, Math.floor(width / 90)));
     const inside = element(svg, "svg", { x: box.left, y: box.top - 3, width: width - box.left - box.right, height: bottom - box.top + 6,
