@@ -61,6 +61,33 @@ def test_only_nodes_import_rclpy(path: Path) -> None:
             assert "ros" in path.relative_to(ROOT / "src").parts, f"{path}:{line}: rclpy belongs under ros/"
 
 
+ENDPOINTS = {
+    "create_publisher",
+    "create_subscription",
+    "create_service",
+    "create_client",
+    "ActionClient",
+    "ActionServer",
+}
+ENDPOINTS |= {"OneGoal", "Saying", "listen"}
+GLOBAL = {"/clock", "/tf", "/tf_static"}  # absolute in every stack
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "src").glob("*/*/ros/*.py")), ids=lambda path: str(path.relative_to(ROOT / "src"))
+)
+def test_names_are_relative_so_that_two_robots_can_share_a_domain(path: Path) -> None:
+    if path.name == "crash_harness.py" or package_of(path) == "pbrl_bringup":
+        return  # speak to a graph of their own, or to one from outside
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.Call) or getattr(node.func, "attr", getattr(node.func, "id", "")) not in ENDPOINTS:
+            continue
+        for argument in node.args[:3]:
+            first = argument.values[0] if isinstance(argument, ast.JoinedStr) else argument
+            text = first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else ""
+            assert not text.startswith("/") or text in GLOBAL, f"{path}:{node.lineno}: {text!r} is absolute"
+
+
 def test_no_import_ring_inside_a_package() -> None:
     graph: dict[str, set[str]] = {}
     modules = {module_name(path) for path in FILES}

@@ -13,7 +13,16 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["numpy", "scipy", "numba", "pydantic"],
+    python_requires=">=3.11",
+    install_requires=[
+        "pbrl_bag",
+        "pbrl_model",
+        "numba>=0.60",
+        "numpy>=1.26",
+        "pydantic>=2.6",
+        "scipy>=1.12",
+        "shapely>=2.0.3",
+    ],
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -17,6 +17,7 @@ from pbrl_bringup.graph import (
     load_graph,
     node_command,
     node_environment,
+    parse_namespace,
     parse_setting,
     with_parameters,
 )
@@ -51,6 +52,24 @@ def test_parameters_keep_their_type() -> None:
         *("--ros-args", "-r", "__node:=sim"),
         *("-p", 'scene:="on"', "-p", "rate:=1.0", "-p", "seed:=3", "-p", "gui:=false"),
     ]
+
+
+def test_a_robot_with_a_namespace_has_its_own_clock_and_transforms() -> None:
+    command = node_command("sim", Node(package="krang_sim", executable="sim_node"), "/fleet/a")
+    assert command[1:4] == ["--ros-args", "-r", "__node:=sim"]
+    rules = ["__ns:=/fleet/a", "/clock:=/fleet/a/clock", "/tf:=/fleet/a/tf", "/tf_static:=/fleet/a/tf_static"]
+    assert command[4:] == [word for rule in rules for word in ("-r", rule)]
+
+
+@pytest.mark.parametrize(("text", "namespace"), [("", ""), ("/", ""), ("a", "/a"), ("/a_1/b/", "/a_1/b")])
+def test_a_namespace_has_one_slash_in_front(text: str, namespace: str) -> None:
+    assert parse_namespace(text) == namespace
+
+
+@pytest.mark.parametrize("text", ["1a", "a b", "a//b", "~a", "a-b", "rö", "a/1", "__ns:=/x"])
+def test_a_namespace_that_ros_does_not_take_is_a_line(text: str) -> None:
+    with pytest.raises(BringupError, match="namespace: expected letters, digits and underscores"):
+        parse_namespace(text)
 
 
 def test_optional_nodes_start_when_they_are_asked_for() -> None:

@@ -70,7 +70,7 @@ def test_every_package_is_in_the_index(package: str) -> None:
         ("krang_sim", "sim_node", 'scene:="locked_castor"', "locked_caster"),
         ("krang_sim", "hand_node", 'scene:="locked_castor"', "locked_caster"),
         ("tabletop_sim", "sim_node", 'scene:="dekc"', "desk"),
-        ("tabletop_sim", "sim_node", 'vision:="blurred"', "rendered or noise"),
+        ("tabletop_sim", "sim_node", 'vision:="blurred"', "rendered, noise or empty"),
         ("pbrl_planner", "tabletop_node", "think:=0.0", "0.05 to 600"),
         ("pbrl_control", "push_node", 'plan:="turn_tabel"', "turn_table"),
         ("pbrl_model", "model_node", 'priors:="nowhere.yaml"', "nowhere.yaml"),

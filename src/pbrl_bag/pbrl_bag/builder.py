@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +10,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrl_bag.batches import Batch
+from pbrl_bag.clocks import clock_notes
 from pbrl_bag.decoding import poses_in, wrench_in
 from pbrl_bag.errors import BagError
 from pbrl_bag.geometry import bodies_of_mapping, bodies_of_scene, corners
 from pbrl_bag.grasps import GraspChange, change_in, grasps_from_changes, grasps_from_mapping
 from pbrl_bag.mapping import FramePose, Mapping, PoseSource, WrenchSource
 from pbrl_bag.roles import CONTRACT, Kind, Role, roles_of, topic_of
+from pbrl_bag.samples import Samples
 from pbrl_bag.streams import Limits, pose_stream, read_only, wrench_stream
 from pbrl_bag.types import Array, BodyGeometry, Grasp, PoseStream, Recording, WrenchStream
 from pbrl_bag.validation import nearest
@@ -24,37 +25,6 @@ from pbrl_bag.validation import nearest
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 NEWTONS = {"N": 1.0, "lbf": 4.4482216152605, "kgf": 9.80665}
 NEWTON_METRES = {"N m": 1.0, "lbf in": 0.1129848290276167}
-
-
-@dataclass
-class Samples:
-    """What one stream has brought so far, in the units and the frame it came in.
-
-    Attributes:
-        label: what to call the stream in errors.
-        rows: (time, six or seven values) each: position and quaternion, or force and torque; the newest.
-        before: the same as arrays (n, 7 or 8), before `rows`.
-    """
-
-    label: str
-    source: PoseSource | WrenchSource
-    rows: list[tuple[float, ...]] = field(default_factory=list)
-    before: list[Array] = field(default_factory=list)
-
-    def __len__(self) -> int:
-        return len(self.rows) + sum(map(len, self.before))
-
-    def extend(self, rows: Array) -> None:
-        """Add many samples (n, 7 or 8)."""
-        if self.rows:
-            self.before.append(np.array(self.rows, dtype=np.float64))
-            self.rows = []
-        self.before.append(rows)
-
-    def array(self, width: int) -> Array:
-        """Return the samples as (n, width)."""
-        newest = np.array(self.rows, dtype=np.float64).reshape(-1, width)
-        return np.concatenate([*self.before, newest]) if self.before else newest
 
 
 class RecordingBuilder:
@@ -78,12 +48,13 @@ class RecordingBuilder:
             self._topics[topic] = roles_of(topic, self.mapping)
         return bool(self._topics[topic])
 
-    def add(self, topic: str, stamp_message: Any) -> None:
+    def add(self, topic: str, stamp_message: Any, heard: float | None = None) -> None:
         """Take one message; topics without a role are ignored.
 
         Args:
             topic: where it was heard.
             stamp_message: the decoded message, a real instance or any object with the same attributes.
+            heard: when it was heard [s], on one clock for all topics, if known; clocks are compared by it.
 
         Raises:
             BagError: its type or frame does not fit the topic's role.
@@ -96,17 +67,17 @@ class RecordingBuilder:
             elif role.kind == "scene":
                 self._add_scene(topic, stamp_message)
             elif isinstance(role.source, WrenchSource):
-                self._add_wrench(topic, role, role.source, stamp_message)
+                self._add_wrench(topic, role, role.source, stamp_message, heard)
             elif isinstance(role.source, PoseSource):
-                self._add_pose(topic, role, role.source, stamp_message)
+                self._add_pose(topic, role, role.source, stamp_message, heard)
 
     def takes(self, topic: str, batch: Batch) -> bool:
         """Tell whether a batch of a topic is what every role of the topic is filled with."""
         expected = PoseSource if batch.kind == "pose" else WrenchSource
         return self.wants(topic) and all(isinstance(role.source, expected) for role in self._topics[topic])
 
-    def add_batch(self, topic: str, batch: Batch) -> None:
-        """Take many messages that `takes` says yes to; the same as `add` one by one.
+    def add_batch(self, topic: str, batch: Batch, heard: Array | None = None) -> None:
+        """Take many messages that `takes` says yes to, heard at times (n,) [s]; the same as `add` one by one.
 
         Raises:
             BagError: their frame does not fit the topic's role.
@@ -124,7 +95,7 @@ class RecordingBuilder:
                 if role.source.ignore_orientation:
                     values[:, 3:] = np.nan
                 samples = self.samples(role.kind, role.name, topic, role.source)
-            samples.extend(np.column_stack([batch.time, values]))
+            samples.extend(np.column_stack([batch.time, values]), heard)
 
     def samples(self, kind: Kind, name: str, label: str, source: PoseSource | WrenchSource) -> Samples:
         """Return the samples of a role, to be added to; empty at first."""
@@ -142,7 +113,7 @@ class RecordingBuilder:
             BagError: a topic is missing, a stream is malformed; the message names topic, time and field.
         """
         path = Path(path)
-        notes = list(self.notes)
+        notes = self.notes + clock_notes(self._lags())
         objects = self._poses("object_poses", notes)
         grippers = self._poses("gripper_poses", notes)
         wrenches = self._wrenches(notes)
@@ -158,6 +129,11 @@ class RecordingBuilder:
         if complete:
             self._check_complete(recording)
         return recording
+
+    def _lags(self) -> dict[str, Array]:
+        """Return when messages were heard less their stamps [s], by topic; wrenches, which are most, come first."""
+        streams = sorted(self._samples.items(), key=lambda each: (each[0][0] != "wrenches", each[0]))
+        return {samples.label: np.concatenate([np.empty(0), *samples.lags]) for _, samples in streams}
 
     def _left_out(self, objects: dict[str, PoseStream], wrenches: dict[str, WrenchStream]) -> list[str]:
         """Say which kinds of what a recording is made of are missing."""
@@ -175,11 +151,11 @@ class RecordingBuilder:
             raise BagError(f"{topic}: expected pbrl_msgs/Scene, got {type(message).__name__}")
         self._scene = (bodies_of_scene(topic, message), corners(message.room))
 
-    def _add_wrench(self, topic: str, role: Role, source: WrenchSource, message: Any) -> None:
+    def _add_wrench(self, topic: str, role: Role, source: WrenchSource, message: Any, heard: float | None) -> None:
         sample = wrench_in(topic, message)
         self._check_wrench_frame(topic, role, sample.time, sample.frame)
         torque = (np.nan,) * 3 if source.ignore_torque else sample.torque
-        self.samples("wrenches", role.name, topic, source).rows.append((sample.time, *sample.force, *torque))
+        self.samples("wrenches", role.name, topic, source).add(sample.time, (*sample.force, *torque), heard)
 
     def _check_wrench_frame(self, topic: str, role: Role, time: float, frame: str) -> None:
         contract = f"{role.name}_ft"
@@ -189,12 +165,12 @@ class RecordingBuilder:
                 "say in a mapping in which axes it is given"
             )
 
-    def _add_pose(self, topic: str, role: Role, source: PoseSource, message: Any) -> None:
+    def _add_pose(self, topic: str, role: Role, source: PoseSource, message: Any, heard: float | None) -> None:
         samples = self.samples(role.kind, role.name, topic, source)
-        for sample in poses_in(topic, message, source.child_frame):
+        for sample in poses_in(topic, message, source.child_frame, source.index):
             self._check_pose_frame(topic, source, sample.time, sample.frame)
             turn = (np.nan,) * 4 if source.ignore_orientation else sample.quaternion
-            samples.rows.append((sample.time, *sample.position, *turn))
+            samples.add(sample.time, (*sample.position, *turn), heard)
 
     def _check_pose_frame(self, topic: str, source: PoseSource, time: float, frame: str) -> None:
         expected = source.frame or self.mapping.world

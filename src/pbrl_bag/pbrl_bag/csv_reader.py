@@ -145,7 +145,7 @@ def _add_pose(builder: RecordingBuilder, table: Table, time: Array, kind: str, n
     rows = np.column_stack([time, position, quaternion])
     label = f"{table.path}: {kind}.{name}"
     samples = builder.samples("object_poses" if kind == "object_poses" else "gripper_poses", name, label, source)
-    samples.rows.extend(map(tuple, rows.tolist()))
+    samples.extend(rows)
 
 
 def _add_wrench(builder: RecordingBuilder, table: Table, time: Array, side: str, source: WrenchSource) -> None:
@@ -158,4 +158,4 @@ def _add_wrench(builder: RecordingBuilder, table: Table, time: Array, side: str,
     torque = np.full_like(force, np.nan) if source.torque is None else table.columns(source.torque)
     rows = np.column_stack([time, force, torque])
     samples = builder.samples("wrenches", side, f"{table.path}: wrenches.{side}", source)
-    samples.rows.extend(map(tuple, rows.tolist()))
+    samples.extend(rows)

@@ -41,16 +41,17 @@ def nanoseconds(stamp: Any) -> int:
     return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
 
 
-def poses_in(topic: str, message: Any, child_frame: str | None) -> Iterator[PoseSample]:
+def poses_in(topic: str, message: Any, child_frame: str | None, index: int | None = None) -> Iterator[PoseSample]:
     """Yield the poses that a message carries.
 
     Args:
         topic: named in errors.
-        message: PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped or TFMessage.
+        message: PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped, TFMessage or PoseArray.
         child_frame: which transform of a TFMessage; for the others, checked where given.
+        index: which pose of a PoseArray; one that is too short has none.
 
     Raises:
-        BagError: the message carries no stamped pose, or `child_frame` is needed and missing.
+        BagError: the message carries no stamped pose, or `child_frame` or `index` is needed and missing.
     """
     if hasattr(message, "transforms"):
         if child_frame is None:
@@ -62,9 +63,16 @@ def poses_in(topic: str, message: Any, child_frame: str | None) -> Iterator[Pose
             yield _from_transform(message)
     elif hasattr(message, "pose") and hasattr(message, "header"):
         yield _from_pose(message)
+    elif hasattr(message, "poses") and hasattr(message, "header"):
+        if index is None:
+            raise BagError(f"{topic}: carries many poses: expected index in the mapping, got none")
+        for pose in message.poses[index : index + 1]:
+            if not hasattr(pose, "position"):
+                raise BagError(f"{topic}: expected a PoseArray, got {type(message).__name__}; give another topic")
+            yield _sample(message.header, pose.position, pose.orientation)
     else:
         raise BagError(
-            f"{topic}: expected a stamped pose (PoseStamped, TransformStamped, Odometry, TFMessage), "
+            f"{topic}: expected a stamped pose (PoseStamped, TransformStamped, Odometry, TFMessage, PoseArray), "
             f"got {type(message).__name__}; give another topic in the mapping"
         )
 

@@ -52,12 +52,13 @@ class TimeColumn(_Strict):
 class PoseSource(_Strict):
     """Where the pose of a body or gripper comes from: a topic, or columns.
 
-    Topics may carry PoseStamped, PoseWithCovarianceStamped, TransformStamped, Odometry, or TFMessage
-    (then `child_frame` says which transform).
+    Topics may carry PoseStamped, PoseWithCovarianceStamped, TransformStamped, Odometry, TFMessage
+    (then `child_frame` says which transform), or PoseArray (then `index` says which pose).
     """
 
     topic: str | None = None
     child_frame: str | None = None
+    index: int | None = Field(default=None, ge=0)
     position: tuple[Column, Column, Column] | None = None
     orientation: tuple[Column, Column, Column, Column] | None = None  # quaternion x y z w
     yaw: Column | None = None
@@ -66,6 +67,7 @@ class PoseSource(_Strict):
     frame: str | None = None  # the frame that the values are given in; default: `world`
     offset: FramePose = FramePose()  # pose of the body's (gripper's) frame in the frame that is observed
     ignore_orientation: bool = False  # the topic's orientation means nothing
+    clock_offset: float = 0.0  # [s] added to its times
 
     @model_validator(mode="after")
     def _one_source(self) -> PoseSource:
@@ -75,6 +77,8 @@ class PoseSource(_Strict):
             raise ValueError("expected `orientation` or `yaw`, got both")
         if self.topic is not None and (self.orientation is not None or self.yaw is not None):
             raise ValueError("`orientation` and `yaw` name columns: they do not go with `topic`")
+        if self.index is not None and self.topic is None:
+            raise ValueError("`index` says which pose of a PoseArray: it goes with `topic`")
         return self
 
 
@@ -95,6 +99,7 @@ class WrenchSource(_Strict):
     exerted_on: Literal["gripper", "object"]
     axes: str = "sensor"
     ignore_torque: bool = False  # the topic's torque means nothing
+    clock_offset: float = 0.0  # [s] added to its times
 
     @model_validator(mode="after")
     def _one_source(self) -> WrenchSource:

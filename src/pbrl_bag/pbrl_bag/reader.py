@@ -14,11 +14,13 @@ from mcap_ros2.decoder import DecoderFactory
 from pbrl_bag.batches import batch_of
 from pbrl_bag.builder import RecordingBuilder
 from pbrl_bag.csv_reader import read_csv
+from pbrl_bag.decoding import NANOSECONDS
 from pbrl_bag.errors import BagError
 from pbrl_bag.foreign_bag import ForeignBag, is_foreign
 from pbrl_bag.mapping import Mapping, load_mapping
 from pbrl_bag.mcap_file import McapFile, RawMessage
 from pbrl_bag.metadata import files_of_bag
+from pbrl_bag.names import canonical, namespace_of
 from pbrl_bag.types import Recording
 
 Hearers = MappingType[str, Callable[[Any], None]]
@@ -50,7 +52,7 @@ def read_recording(
     rules = None if mapping is None else load_mapping(mapping)
     files = files_of(path)
     if path.suffix.lower() != ".csv":
-        return _read_bag(path, [opened(file) for file in files], rules, complete, also or {})
+        return _read_bag(path, files, rules, complete, also or {})
     if rules is None:
         raise BagError(f"{path}: a CSV file needs a mapping that names its columns; see config/mappings/")
     return read_csv(path, rules)
@@ -111,55 +113,70 @@ class Decoder:
         return decoder
 
 
-def _read_bag(
-    path: Path, files: list[McapFile | ForeignBag], rules: Mapping | None, complete: bool, also: Hearers
-) -> Recording:
-    """Read the messages that play a role, in the order in which they were heard."""
-    builder = RecordingBuilder(rules)
-    total = 0
-    for file in files:
-        if isinstance(file, ForeignBag):  # in order already, and decoded while it is open
-            for message in file.messages():
-                total += 1
-                if builder.wants(message.topic) or message.topic in also:
-                    _give(builder, also, message.topic, file.decode(message))
-            continue
-        wanted: dict[str, list[RawMessage]] = {}
-        for message in file.messages():
-            total += 1
-            if builder.wants(message.topic) or message.topic in also:
-                wanted.setdefault(message.topic, []).append(message)
-        decoder = Decoder(file)
-        left: list[RawMessage] = []
-        for messages in wanted.values():
-            if not _taken_together(builder, decoder, messages, also):
-                left += messages
-        for message in sorted(left, key=lambda one: one.log_time):
-            _give(builder, also, message.topic, decoder.decode(message))
-        builder.notes += file.notes
-    if total == 0:
+def _read_bag(path: Path, files: tuple[Path, ...], rules: Mapping | None, complete: bool, also: Hearers) -> Recording:
+    """Read the messages that play a role; those of a robot in a namespace where there is none in the root."""
+    builder, topics = _collected(files, rules, "", also)
+    if not topics:
         why = builder.notes[-1] if builder.notes else "it was finished without one"
         raise BagError(f"{path}: expected messages, got none: {why}")
+    namespace = "" if rules is not None else namespace_of(topics, str(path))
+    if namespace:
+        builder, _ = _collected(files, rules, namespace, also)
+        builder.notes.append(f"the robot's namespace {namespace} is left out of the names of its topics")
     return builder.build(path, complete=complete)
 
 
-def _give(builder: RecordingBuilder, also: Hearers, topic: str, message: Any) -> None:
-    builder.add(topic, message)
-    if topic in also:
-        also[topic](message)
+def _collected(
+    files: tuple[Path, ...], rules: Mapping | None, namespace: str, also: Hearers
+) -> tuple[RecordingBuilder, set[str]]:
+    """Return the messages of a namespace that play a role, in the order in which they were heard; and all topics."""
+    builder, topics = RecordingBuilder(rules), set[str]()
+
+    def role(message: RawMessage) -> str | None:
+        topics.add(message.topic)
+        name = canonical(message.topic, namespace)
+        return name if name is not None and (builder.wants(name) or name in also) else None
+
+    for file in map(opened, files):
+        if isinstance(file, ForeignBag):  # in order already, and decoded while it is open
+            for message in file.messages():
+                if name := role(message):
+                    _give(builder, also, name, file.decode(message), message)
+            continue
+        wanted: dict[str, list[RawMessage]] = {}
+        for message in file.messages():
+            if name := role(message):
+                wanted.setdefault(name, []).append(message)
+        decoder = Decoder(file)
+        left: list[tuple[str, RawMessage]] = []
+        for name, messages in wanted.items():
+            if not _taken_together(builder, decoder, name, messages, also):
+                left += [(name, each) for each in messages]
+        for name, message in sorted(left, key=lambda one: one[1].log_time):
+            _give(builder, also, name, decoder.decode(message), message)
+        builder.notes += file.notes
+    return builder, topics
 
 
-def _taken_together(builder: RecordingBuilder, decoder: Decoder, messages: list[RawMessage], also: Hearers) -> bool:
+def _give(builder: RecordingBuilder, also: Hearers, name: str, decoded: Any, message: RawMessage) -> None:
+    builder.add(name, decoded, message.log_time / NANOSECONDS)
+    if name in also:
+        also[name](decoded)
+
+
+def _taken_together(
+    builder: RecordingBuilder, decoder: Decoder, name: str, messages: list[RawMessage], also: Hearers
+) -> bool:
     """Give the messages of one topic to the builder in one go, or return False where that cannot be done."""
     messages.sort(key=lambda one: one.log_time)
-    topic, several = messages[0].topic, len({one.channel for one in messages}) > 1
-    batch = None if several or topic in also else batch_of(messages[0].type, [one.data for one in messages])
-    if batch is None or not builder.takes(topic, batch):
+    several = len({one.channel for one in messages}) > 1
+    batch = None if several or name in also else batch_of(messages[0].type, [one.data for one in messages])
+    if batch is None or not builder.takes(name, batch):
         return False
     for k in (0, len(messages) // 2, -1):  # a stranger's type of that name can have its fields in another order
         if not np.array_equal(batch.values[k], _numbers(decoder.decode(messages[k])), equal_nan=True):
             return False
-    builder.add_batch(topic, batch)
+    builder.add_batch(name, batch, np.array([one.log_time for one in messages]) / NANOSECONDS)
     return True
 
 

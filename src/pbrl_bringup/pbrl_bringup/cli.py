@@ -5,10 +5,8 @@ Exit codes: 0 done; 1 a fault of ours, or tests that fail; 2 something the perso
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
-import traceback
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -18,6 +16,7 @@ from typing import Annotated, Any
 import typer
 from typer.exceptions import TyperException
 
+from pbrl_bringup.cli_errors import complain, complain_of
 from pbrl_bringup.cli_options import (
     Bag,
     Diagnosis,
@@ -28,6 +27,7 @@ from pbrl_bringup.cli_options import (
     Many,
     Mapping,
     Models,
+    Namespace,
     Opened,
     Out,
     Port,
@@ -35,19 +35,6 @@ from pbrl_bringup.cli_options import (
     Sampler,
     Seed,
 )
-
-# Errors whose message is for the person at the keyboard. Named, not imported: an error can only have
-# been raised by a module that is loaded, and loading all of them would slow every start.
-USER_ERRORS = {
-    "pbrl_bag.errors": "BagError",
-    "pbrl_model.errors": "ModelError",
-    "pbrl_mismatch.errors": "MismatchError",
-    "pbrl_control.errors": "ControlError",
-    "pbrl_planner.errors": "PlannerError",
-    "pbrl_namo.errors": "NamoError",
-    "bullet_sim.errors": "SimError",
-    "pbrl_bringup.errors": "BringupError",
-}
 
 STOPPED = 130  # what Ctrl-C ends with; typer itself turns it into this code
 
@@ -189,31 +176,35 @@ def run(
     graph: Annotated[str, typer.Argument(help="Graph file, or a name in config/params/graphs.")],
     set_: Annotated[list[str] | None, typer.Option("--set", help="NODE.PARAMETER=VALUE, as often as needed.")] = None,
     with_: Annotated[list[str] | None, typer.Option("--with", help="An optional node to start too.")] = None,
+    namespace: Namespace = "",
     domain: Domain = None,
     logs: Annotated[Path, typer.Option(help="Folder for the nodes' output.")] = Path("out/logs"),
 ) -> int:
     """Start a graph of nodes and keep it until Ctrl-C."""
-    return _hand_over("run", graph=graph, settings=set_ or [], optional=with_ or [], domain=domain, logs=logs)
+    chosen = {"settings": set_ or [], "optional": with_ or [], "namespace": namespace}
+    return _hand_over("run", graph=graph, **chosen, domain=domain, logs=logs)
 
 
 @app.command(epilog="Example: ./pbrl record --out out/push.bag")
 def record(
     out: Annotated[Path, typer.Option(help="Bag folder to make; it must not exist yet.")],
     duration: Annotated[float, typer.Option(min=0, max=1e9, help="Seconds to record; 0: until Ctrl-C.")] = 0.0,
+    namespace: Namespace = "",
     domain: Domain = None,
 ) -> int:
-    """Record the contract's topics of a running graph or robot."""
-    return _hand_over("record", out=out, duration=duration, domain=domain)
+    """Record the topics of a running graph or robot."""
+    return _hand_over("record", out=out, duration=duration, namespace=namespace, domain=domain)
 
 
 @app.command(epilog="Example: ./pbrl play out/push.bag --rate 2")
 def play(
     bag: Annotated[Path, typer.Argument(help="Bag folder or .mcap file.")],
     rate: Annotated[float, typer.Option(min=0.01, max=1000, help="Times faster than it was recorded.")] = 1.0,
+    namespace: Namespace = "",
     domain: Domain = None,
 ) -> int:
     """Publish a recording again."""
-    return _hand_over("play", bag=bag, rate=rate, domain=domain)
+    return _hand_over("play", bag=bag, rate=rate, namespace=namespace, domain=domain)
 
 
 @app.command(epilog="Example: ./pbrl info out/push.bag")
@@ -232,11 +223,20 @@ def view(
     report: Diagnosis = None,
     port: Port = None,
     opened: Opened = None,
+    namespace: Namespace = "",
     domain: Domain = None,
 ) -> int:
     """Show a recording or a running graph on a page of this machine: top view, forces, models, time."""
     return _hand_over(
-        "view", what=what, mapping=mapping, models=model or [], report=report, port=port, opened=opened, domain=domain
+        "view",
+        what=what,
+        mapping=mapping,
+        models=model or [],
+        report=report,
+        port=port,
+        opened=opened,
+        namespace=namespace,
+        domain=domain,
     )
 
 
@@ -314,35 +314,13 @@ def run_arguments(arguments: Sequence[str]) -> int:
     """Run one command and return its exit code; every error ends here, as one line on stderr."""
     try:
         code = int(app(args=list(arguments) or ["--help"], prog_name="pbrl", standalone_mode=False) or 0)
-        return _complain("stopped", STOPPED) if code == STOPPED else code
+        return complain("stopped", STOPPED) if code == STOPPED else code
     except TyperException as error:
-        return _complain(" ".join(error.format_message().split()) or "see --help", 2)
+        return complain(" ".join(error.format_message().split()) or "see --help", 2)
     except KeyboardInterrupt:
-        return _complain("stopped", STOPPED)
+        return complain("stopped", STOPPED)
     except Exception as error:
-        if _is_for_the_user(error):
-            return _complain(" ".join(str(error).split()), 2)
-        return _complain(_fault(error), 1)
-
-
-def _is_for_the_user(error: Exception) -> bool:
-    loaded = [(sys.modules[module], name) for module, name in USER_ERRORS.items() if module in sys.modules]
-    return isinstance(error, tuple(getattr(module, name) for module, name in loaded))
-
-
-def _fault(error: Exception) -> str:
-    """Describe an error that nobody foresaw; PBRL_TRACEBACK=1 shows where it comes from."""
-    if os.environ.get("PBRL_TRACEBACK"):
-        traceback.print_exception(error)
-    frame = traceback.extract_tb(error.__traceback__)[-1]
-    what = " ".join(f"{type(error).__name__}: {error}".split())
-    where = f"{Path(frame.filename).name}:{frame.lineno}"
-    return f"a fault in pbrl at {where}, {what}; PBRL_TRACEBACK=1 shows more"
-
-
-def _complain(message: str, code: int) -> int:
-    print(f"pbrl: {message}", file=sys.stderr)
-    return code
+        return complain_of(error)
 
 
 def _leave(number: int, frame: FrameType | None) -> None:

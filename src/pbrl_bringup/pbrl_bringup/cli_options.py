@@ -54,4 +54,7 @@ Draws = Annotated[
     int | None,
     typer.Option(min=10, help="Posterior draws to keep from each of 4 chains, or a quarter of all. Default: 500."),
 ]
+Namespace = Annotated[
+    str, typer.Option(help="Of the robot, such as robot_1: several can share a domain. Default: none, the root.")
+]
 Many = {"allow_extra_args": True, "ignore_unknown_options": True}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from pathlib import Path
 from pydantic import Field
 
 from bullet_sim.settings import Settings, read_settings
+from pbrl_bag.names import GLOBAL
 from pbrl_bag.yaml_text import parse_yaml
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.paths import config_file, node_executable
@@ -20,6 +22,7 @@ from pbrl_bringup.ros.client import GraphClient
 
 Scalar = bool | int | float | str | list[float] | list[str]
 DOMAINS = range(1, 101)  # with higher numbers, DDS's ports run into those that the system hands out
+NAMESPACE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 DOMAIN_PORT = 32768  # bound while a domain is in use, as ROS's own domain_coordinator does
 
 
@@ -100,13 +103,21 @@ def _value(key: str, text: str) -> Scalar:
     return value
 
 
-def node_command(name: str, node: Node) -> list[str]:
+def node_command(name: str, node: Node, namespace: str = "") -> list[str]:
     """Return the command line of a node, as `ros2 run PACKAGE EXECUTABLE --ros-args ...` makes it.
+
+    Args:
+        name: of the node.
+        node: its executable and parameters.
+        namespace: of its robot, as `parse_namespace` gives it; clock and transforms, global elsewhere, are in it, too.
 
     Raises:
         BringupError: there is no such executable, or a parameter is not a ROS parameter value.
     """
     command = [str(node_executable(node.package, node.executable)), "--ros-args", "-r", f"__node:={name}"]
+    if namespace:
+        for old, new in {"__ns": namespace, **{topic: namespace + topic for topic in GLOBAL}}.items():
+            command += ["-r", f"{old}:={new}"]
     for key, value in node.parameters.items():
         command += ["-p", f"{key}:={_parameter_text(value)}"]
     return command
@@ -157,13 +168,28 @@ def free_domain() -> Iterator[int]:
 
 
 @contextmanager
-def running_graph(graph: Graph, logs: Path, domain: int) -> Iterator[Programs]:
-    """Start every node of a graph in order; all are gone when the block ends."""
-    commands = {name: node_command(name, node) for name, node in graph.nodes.items()}  # errors before anything runs
+def running_graph(graph: Graph, logs: Path, domain: int, namespace: str = "") -> Iterator[Programs]:
+    """Start every node of a graph in order, in a namespace; all are gone when the block ends."""
+    # errors before anything runs
+    commands = {name: node_command(name, node, namespace) for name, node in graph.nodes.items()}
     with Programs(logs, node_environment(domain)) as programs:
         for name, command in commands.items():
             programs.start(name, command)
         yield programs
+
+
+def parse_namespace(text: str) -> str:
+    """Return the namespace of a robot with a leading slash; empty: the root.
+
+    Raises:
+        BringupError: a name that ROS does not take.
+    """
+    name = text.strip("/")
+    if name and not NAMESPACE.fullmatch(name):
+        raise BringupError(
+            f"namespace: expected letters, digits and underscores, no digit first, such as robot_1, got {text!r}"
+        )
+    return f"/{name}" if name else ""
 
 
 def parse_setting(text: str) -> tuple[str, str]:

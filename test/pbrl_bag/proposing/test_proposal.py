@@ -24,6 +24,8 @@ WANTED = {
     "transforms": ("left", "desk"),
     "odometry": ("left", "cart"),
     "other frames": ("left", "crate"),
+    "array": ("left", "1"),
+    "two clocks": ("left", "bench"),
     "one hand": ("left", "sofa"),
 }
 
@@ -48,7 +50,8 @@ def test_roles_are_found_whatever_the_laboratory_calls_them(lab: str, tmp_path: 
     name = next(iter(mapping.object_poses))
     assert body in name
     assert all(each.why for each in proposal.streams)
-    assert {each.stream for each in proposal.streams if not each.role} == {"/chair/pose", "/tf (base_link)"}
+    idle = {each.stream for each in proposal.streams if not each.role} - {"/tracker/bodies (0)"}
+    assert idle == {"/chair/pose", "/tf (base_link)"}
     (grasp,) = mapping.grasps
     assert (grasp.gripper, grasp.object) == (side, name)
     np.testing.assert_allclose(grasp.contact, CONTACT, atol=0.005)
@@ -77,6 +80,19 @@ def test_what_no_bag_tells_is_left_to_do_and_not_made_up(tmp_path: Path) -> None
         load_mapping(path)
     assert yaml.safe_load(text)["bodies"] is None
     assert "# To do: the outline of 'sofa'" in text
+
+
+def test_a_pose_out_of_an_array_has_to_be_named(tmp_path: Path) -> None:
+    bag = bag_of(tmp_path / "bag", recorded(LABS["array"]))
+    text = mapping_text(propose(bag), "bag", {"body_1": (1.2, 0.8)})
+    assert "index: 1" in text
+    path = tmp_path / "mapping.yaml"
+    path.write_text(text.replace(", index: 1", ""))
+    with pytest.raises(BagError, match="/tracker/bodies: carries many poses: expected index"):
+        read_recording(bag, path)
+    path.write_text(text.replace("index: 1", "index: 7"))
+    with pytest.raises(BagError, match="is never observed"):
+        read_recording(bag, path)
 
 
 def test_a_bag_of_the_contract_needs_no_mapping(push_bag: Path) -> None:

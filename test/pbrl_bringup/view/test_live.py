@@ -158,7 +158,8 @@ def test_the_page_follows_and_comes_back(browser: Browser) -> None:
     assert not [each for each in browser.complaints if "ERR_" not in each], "the server was away; nothing else"
 
 
-def test_it_hears_a_graph_over_ros() -> None:
+@pytest.mark.parametrize("robot", ["", "/robot_1"])
+def test_it_hears_a_graph_over_ros(robot: str) -> None:
     graph, latched = LiveGraph("graph"), QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     arrived = threading.Event()
 
@@ -173,10 +174,10 @@ def test_it_hears_a_graph_over_ros() -> None:
         rclpy.init(context=context, domain_id=domain)
         node = rclpy.create_node("talker", context=context)
         try:
-            node.create_publisher(Scene, "/scene", latched).publish(scene())
-            poses = node.create_publisher(PoseStamped, "/ar_tags/table/pose", 10)
-            wrong = node.create_publisher(PoseStamped, "/wrist_ft/left", 10)
-            with ViewListener(graph.wants, hear, domain):
+            node.create_publisher(Scene, f"{robot}/scene", latched).publish(scene())
+            poses = node.create_publisher(PoseStamped, f"{robot}/ar_tags/table/pose", 10)
+            wrong = node.create_publisher(PoseStamped, f"{robot}/wrist_ft/left", 10)
+            with ViewListener(graph.wants, hear, domain, robot):
                 for k in range(600):
                     poses.publish(tag(20.0 + 0.05 * k, 1.0))
                     wrong.publish(tag(20.0 + 0.05 * k, 1.0))

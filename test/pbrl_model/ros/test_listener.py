@@ -96,6 +96,25 @@ def test_hears_what_makes_a_recording(context: Context) -> None:
     listener.stop()
 
 
+def test_only_our_own_robot_is_heard_and_by_the_names_of_the_contract(context: Context) -> None:
+    listener = RecordingListener("listener", context, namespace="/ours")
+    listener.start()
+    robots = [Node("robot", context=context, namespace=namespace) for namespace in ("/ours", "/", "/theirs", "/ours_2")]
+    for number, robot in enumerate(robots):
+        wrench = stamped(WrenchStamped(), 1.0 + number, "left_ft")
+        wrench.wrench.force.x = float(number)
+        out = robot.create_publisher(WrenchStamped, "wrist_ft/left", LATCHED)
+        out.publish(wrench)
+    until(robots[0], lambda: listener.count() >= 1)
+    listener.discover()  # the others are in the graph by now, too
+    assert {topic for topic, _ in robots[0].get_topic_names_and_types()} >= {"/wrist_ft/left", "/ours_2/wrist_ft/left"}
+    assert listener.get_subscriptions_info_by_topic("/wrist_ft/left") == []
+    assert listener.count() == 1 and listener.last("/wrist_ft/left").wrench.force.x == 0.0
+    for robot in robots:
+        robot.destroy_node()
+    listener.stop()
+
+
 def test_nothing_heard_is_an_error_that_says_so(context: Context) -> None:
     listener = RecordingListener("listener", context)
     with pytest.raises(BagError, match="got no message"):

@@ -10,7 +10,7 @@ from pbrl_planner.tabletop import Desk, Near, Objective, TabletopPlanner, Tablet
 from pbrl_planner.tabletop.carry_kernel import carry
 from pbrl_planner.tabletop.carrying import exchanged, in_the_way, steps_aside
 from pbrl_planner.tabletop.planner import push_tables
-from pbrl_planner.tabletop.tree_kernel import apart, follow
+from pbrl_planner.tabletop.tree_kernel import apart, follow, follow_what_is_free
 
 SETTINGS = TabletopSettings()
 WEIGHT = SETTINGS.orientation
@@ -87,3 +87,27 @@ def test_items_that_block_each_other_are_untangled(carries: bool) -> None:
     assert again.best_cost == search.best_cost
     plan = search.plan()
     assert plan.cost == pytest.approx(objective(plan.layouts[-1]))
+
+
+def test_of_pushes_that_are_not_all_free_those_that_are_go_on(rng: np.random.Generator) -> None:
+    desk = three()
+    model = model_of(desk)
+    kinds = pushes_of(SETTINGS.travels)
+    tables = push_tables(desk, model, kinds, SETTINGS)
+    left_out = 0
+    for _ in range(40):
+        start = layout_of(desk, rng)
+        codes = rng.integers(0, len(desk.names) * len(kinds), 30)
+        free, end, again = np.empty(30, dtype=np.uint8), np.empty_like(start), np.empty_like(start)
+        follow_what_is_free(start, codes, free, tables, end)
+        assert follow(start, codes, free, tables, again), "what was made is free without the rest"
+        assert np.array_equal(end, again)
+        blocked = np.flatnonzero(free == 0)
+        left_out += len(blocked)
+        for each in blocked[:3]:
+            upto = free.copy()
+            upto[each] = 1
+            assert not follow(start, codes[: each + 1], upto[: each + 1], tables, again), (
+                "what was left out is not free"
+            )
+    assert left_out > 0

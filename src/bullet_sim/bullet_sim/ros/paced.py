@@ -25,6 +25,7 @@ from std_msgs.msg import Float64MultiArray
 from bullet_sim.errors import SimError
 from bullet_sim.grippers import GraspOutcome
 from bullet_sim.messages import LATCHED, to_messages
+from bullet_sim.ros.names import relative
 from bullet_sim.ros.parameters import declare
 
 PATIENCE = 0.1
@@ -106,7 +107,8 @@ class PacedSimulator(Node):
         """
         self._session = session
         self._outputs = {
-            topic: self.create_publisher(kind, topic, _quality(topic, latched)) for topic, kind in types.items()
+            topic: self.create_publisher(kind, relative(topic), _quality(topic, latched))
+            for topic, kind in types.items()
         }
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
@@ -116,11 +118,11 @@ class PacedSimulator(Node):
         for side in ("left", "right"):
             self.listen(
                 Float64MultiArray,
-                f"/{side}_arm_velocity_controller/commands",
+                f"{side}_arm_velocity_controller/commands",
                 lambda message, side=side: session.command_arm(side, message.data),
             )
-        self.create_service(GraspObject, "/grasp", partial(self._grasp, session))
-        self.create_service(ReleaseObject, "/release", partial(self._release, session))
+        self.create_service(GraspObject, "grasp", partial(self._grasp, session))
+        self.create_service(ReleaseObject, "release", partial(self._release, session))
 
     def listen(self, kind: Any, topic: str, command: Callable[[Any], None]) -> None:
         """Obey the messages of a topic; what `command` raises SimError for is warned about and ignored."""

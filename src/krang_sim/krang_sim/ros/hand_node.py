@@ -16,6 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from bullet_sim.errors import SimError
+from bullet_sim.ros.names import relative
 from bullet_sim.ros.parameters import declare, refuse_unknown
 from bullet_sim.ros.running import run_node
 from bullet_sim.scene import load_scene
@@ -51,12 +52,12 @@ class HandNode(Node):
         types = message_types(self._session.tagged)
         wanted = {*TOPICS, "/ar_tags/left_gripper/pose", *(f"/ar_tags/{name}/pose" for name in self._session.tagged)}
         self._outputs = {
-            topic: self.create_publisher(kind, topic, LATCHED_QOS if topic in LATCHED else STREAM_QOS)
+            topic: self.create_publisher(kind, relative(topic), LATCHED_QOS if topic in LATCHED else STREAM_QOS)
             for topic, kind in types.items()
             if topic in wanted
         }
         self._publish(self._session.latched())
-        self.create_service(PushObject, "/push", self._push)
+        self.create_service(PushObject, "push", self._push)
 
     def _push(self, request: PushObject.Request, response: PushObject.Response) -> PushObject.Response:
         contact, way = request.contact_point, request.direction

@@ -38,21 +38,19 @@ class SimNode(PacedSimulator):
         self.session = KrangSession(scene, seed=seed, gui=gui)
         self.start(self.session, message_types(self.session.tagged, self.session.cameras))
         self.obey_arms(self.session)
-        self.listen(Twist, "/cmd_vel", lambda message: self.session.command_base(message.linear.x, message.angular.z))
-        self.listen(Float64MultiArray, "/body_velocity_controller/commands", self._command_body)
+        self.listen(Twist, "cmd_vel", lambda message: self.session.command_base(message.linear.x, message.angular.z))
+        self.listen(Float64MultiArray, "body_velocity_controller/commands", self._command_body)
 
     def _declare(self) -> tuple[Scene, int, bool]:
         """Declare every parameter; return scene, seed and gui."""
         scene = declare(self, "scene", "locked_caster", "scene file, or the name of a scene of the workspace")
         model = declare(self, "model", "", "file of a learned model: the body of its name behaves so; empty: none")
-        text = "noise or rendered: pictures on /camera/overhead_<i> for tag_detector_node; empty: as the scene says"
-        tags = declare(self, "tags", "", text)
+        text = "rendered: pictures on /camera/overhead_<i> for tag_detector_node; empty: as the scene says"
+        tags = declare(self, "tags", "", text, choices=(*get_args(TagSource), ""))
         seed = declare(self, "seed", 0, "seed of every random draw", (0, 2**31 - 1))
         gui = declare(self, "gui", False, "open Bullet's window")
         self.declare_pace()
         refuse_unknown(self)
-        if tags not in ("", *get_args(TagSource)):
-            raise KrangError(f"tags: expected {' or '.join(get_args(TagSource))}, got {tags!r}")
         loaded = with_model(load_scene(scene), Path(model)) if model else load_scene(scene)
         return with_tags(loaded, tags) if tags else loaded, seed, gui
 

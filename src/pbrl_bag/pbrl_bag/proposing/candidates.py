@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pbrl_bag.clocks import clock_offsets
 from pbrl_bag.decoding import PoseSample, poses_in, wrench_in
 from pbrl_bag.foreign_bag import ForeignBag
 from pbrl_bag.reader import Decoder, files_of, opened
@@ -16,7 +17,7 @@ from pbrl_bag.types import Array
 
 POSES = ("PoseStamped", "PoseWithCovarianceStamped", "Odometry", "TransformStamped")
 """Types of one pose each."""
-TRANSFORMS, WRENCH = "TFMessage", "WrenchStamped"
+TRANSFORMS, ARRAY, WRENCH = "TFMessage", "PoseArray", "WrenchStamped"
 STATIC = "/tf_static"
 
 
@@ -28,20 +29,26 @@ class PoseCandidate:
         topic: that they came on.
         type: of its messages, without package.
         frame: that they are given in.
-        child: the frame that they are of, where the topic carries several; else None.
+        child: the frame that they are of, where the topic carries several transforms; else None.
+        index: which of a PoseArray they are; else None.
         rows: (time, position, quaternion) each.
+        lags: when each message was heard less its stamp [s].
+        clock_offset: what their times were put right by [s].
     """
 
     topic: str
     type: str
     frame: str
     child: str | None
+    index: int | None = None
     rows: list[tuple[float, ...]] = field(default_factory=list)
+    lags: list[float] = field(default_factory=list)
+    clock_offset: float = 0.0
 
     @property
     def name(self) -> str:
         """Return what tells of what it is: the frame, or the topic."""
-        return self.child or self.topic
+        return self.child or (self.topic if self.index is None else f"{self.topic}/{self.index}")
 
     def array(self) -> Array:
         """Return (n, 8): time [s], position [m], quaternion x y z w, in order of time, each time once."""
@@ -52,11 +59,13 @@ class PoseCandidate:
 
 @dataclass
 class WrenchCandidate:
-    """Wrenches of one topic, given in a frame; `rows` (time, force, torque) each."""
+    """Wrenches of one topic, given in a frame; `rows` (time, force, torque) each; else as `PoseCandidate`."""
 
     topic: str
     frame: str
     rows: list[tuple[float, ...]] = field(default_factory=list)
+    lags: list[float] = field(default_factory=list)
+    clock_offset: float = 0.0
 
     def array(self) -> Array:
         """Return (n, 7): time [s], force [N], torque [N m], in order of time."""
@@ -70,7 +79,7 @@ class Candidates:
 
     Attributes:
         types: of all topics.
-        poses: by topic, child frame and frame that they are given in.
+        poses: by topic, child frame or place in an array, and frame that they are given in.
         wrenches: by topic.
         fixed: (position, quaternion) of a frame in its parent, which never changes, by (parent, child).
     """
@@ -93,31 +102,48 @@ def candidates_of(path: Path) -> Candidates:
         for message in file.messages():
             found.types[message.topic] = message.type
             kind = message.type.rsplit("/", 1)[-1]
-            if kind in (*POSES, TRANSFORMS, WRENCH):
-                _take(found, message.topic, kind, decode(message))
+            if kind in (*POSES, TRANSFORMS, ARRAY, WRENCH):
+                _take(found, message.topic, kind, decode(message), message.log_time * 1e-9)
+    _put_clocks_right(found)
     return found
 
 
-def _take(found: Candidates, topic: str, kind: str, message: Any) -> None:
+def _put_clocks_right(found: Candidates) -> None:
+    """Shift the times of what was stamped by another clock than the wrenches."""
+    streams: dict[str, PoseCandidate | WrenchCandidate] = {}
+    streams.update({f"wrench {topic}": each for topic, each in found.wrenches.items()})
+    streams.update({f"pose {key}": each for key, each in found.poses.items()})
+    for name, offset in clock_offsets({name: each.lags for name, each in streams.items()}).items():
+        streams[name].clock_offset = offset
+        streams[name].rows = [(row[0] + offset, *row[1:]) for row in streams[name].rows]
+
+
+def _take(found: Candidates, topic: str, kind: str, message: Any, heard: float) -> None:
     if kind == WRENCH:
         felt = wrench_in(topic, message)
         stream = found.wrenches.setdefault(topic, WrenchCandidate(topic, felt.frame))
         stream.rows.append((felt.time, *felt.force, *felt.torque))
+        stream.lags.append(heard - felt.time)
         return
-    for child, sample in _samples(topic, kind, message):
+    for child, index, sample in _samples(topic, kind, message):
         if topic == STATIC and child is not None:
             found.fixed[sample.frame, child] = (np.array(sample.position), np.array(sample.quaternion))
             continue
-        key = (topic, child or "", sample.frame)
-        one = found.poses.setdefault(key, PoseCandidate(topic, kind, sample.frame, child))
+        key = (topic, child or ("" if index is None else str(index)), sample.frame)
+        one = found.poses.setdefault(key, PoseCandidate(topic, kind, sample.frame, child, index))
         one.rows.append((sample.time, *sample.position, *sample.quaternion))
+        one.lags.append(heard - sample.time)
 
 
-def _samples(topic: str, kind: str, message: Any) -> Iterator[tuple[str | None, PoseSample]]:
-    """Yield the frames and poses of a message; the frame where a mapping has to name it."""
+def _samples(topic: str, kind: str, message: Any) -> Iterator[tuple[str | None, int | None, PoseSample]]:
+    """Yield the frames, places in an array, and poses of a message; the first two where a mapping has to name them."""
+    if kind == ARRAY:
+        for index in range(len(message.poses)):
+            yield from ((None, index, sample) for sample in poses_in(topic, message, None, index))
+        return
     if kind != TRANSFORMS:
-        yield from ((None, sample) for sample in poses_in(topic, message, None))
+        yield from ((None, None, sample) for sample in poses_in(topic, message, None))
         return
     for transform in message.transforms:
         child = str(transform.child_frame_id).lstrip("/")
-        yield from ((child, sample) for sample in poses_in(topic, message, child))
+        yield from ((child, None, sample) for sample in poses_in(topic, message, child))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.spatial.transform import Rotation
 
 from pbrl_bag.types import Array
@@ -15,6 +16,15 @@ KEPT = 0.03
 """A gripper that holds stays so near to its place on the object [m]."""
 FEWEST = 5
 """Samples in which an object has to move."""
+UNLOADED = 0.3
+"""As long [s] as this the hand stands where it will hold before it feels anything of it."""
+FELT = 8.0
+"""What differs from the first force by more than so many deviations, and by `FELT_SHARE` of the most, is felt."""
+FELT_SHARE = 0.05
+STEADY = 9
+"""Samples of which the middle one counts: sensors have single values that are far off."""
+BEFORE, AFTER = 0.5, 0.1
+"""A gripper was closed so long before it felt anything, and opens so long after [s]."""
 SMOOTH = 0.2
 """Speeds are taken over so long [s]: tags jitter by millimetres."""
 
@@ -83,3 +93,24 @@ def held(of: Array, by: Array) -> Held | None:
     while last + 1 < len(near) and near[last + 1]:
         last += 1
     return Held(float(rows[first, 0]), float(rows[last, 0]), contact, share)
+
+
+def while_felt(together: Held, wrench: Array) -> Held:
+    """Return a hold without the time in which the hand only stood there: nothing was felt then.
+
+    Args:
+        together: by the poses.
+        wrench: (n, 7) time [s], force [N], torque [N m].
+    """
+    rows = wrench[(wrench[:, 0] >= together.start) & (wrench[:, 0] <= together.end)]
+    first = rows[rows[:, 0] < together.start + UNLOADED, 1:4]
+    if len(first) < FEWEST or not np.isfinite(rows).all():
+        return together
+    level = np.median(first, axis=0)
+    noise = float(np.sqrt(np.mean((first - level) ** 2)))
+    off = np.linalg.norm(median_filter(rows[:, 1:4], (STEADY, 1)) - level, axis=1)
+    felt = np.flatnonzero(off > max(FELT * noise, FELT_SHARE * float(off.max())))
+    if not len(felt):
+        return together
+    start = max(together.start, float(rows[felt[0], 0]) - BEFORE)
+    return replace(together, start=start, end=min(together.end, float(rows[felt[-1], 0]) + AFTER))

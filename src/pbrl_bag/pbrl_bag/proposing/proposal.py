@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from pbrl_bag.errors import BagError
 from pbrl_bag.mapping import FramePose, GraspSource, Mapping, PoseSource, WrenchSource
 from pbrl_bag.proposing.candidates import Candidates, PoseCandidate, WrenchCandidate, candidates_of
-from pbrl_bag.proposing.holding import Held, extent, held
+from pbrl_bag.proposing.holding import Held, extent, held, while_felt
 from pbrl_bag.roles import CONTRACT, roles_of
 from pbrl_bag.types import Array
 
@@ -159,6 +160,8 @@ def _poses(found: Candidates, draft: _Draft) -> None:
 
 
 def _label(each: PoseCandidate) -> str:
+    if each.index is not None:
+        return f"{each.topic} ({each.index})"
     return f"{each.topic} ({each.child})" if each.child else each.topic
 
 
@@ -200,14 +203,19 @@ def _mapping(found: Candidates, draft: _Draft) -> Mapping:
 
 
 def _pose_source(each: PoseCandidate, world: str) -> PoseSource:
-    return PoseSource(topic=each.topic, child_frame=each.child, frame=None if each.frame == world else each.frame)
+    return PoseSource(
+        topic=each.topic,
+        child_frame=each.child,
+        index=each.index,
+        frame=None if each.frame == world else each.frame,
+        clock_offset=each.clock_offset,
+    )
 
 
 def _wrench_source(each: WrenchCandidate, world: str, places: dict[str, FramePose]) -> WrenchSource:
     axes = each.frame if each.frame in (world, *places) else "sensor"
-    if COMPENSATED.search(each.topic.lower()):
-        return WrenchSource(topic=each.topic, exerted_on="object", axes=axes)
-    return WrenchSource(topic=each.topic, exerted_on="gripper", axes=axes)
+    on: Literal["gripper", "object"] = "object" if COMPENSATED.search(each.topic.lower()) else "gripper"
+    return WrenchSource(topic=each.topic, exerted_on=on, axes=axes, clock_offset=each.clock_offset)
 
 
 def place_of(frame: str, world: str, found: Candidates) -> FramePose | None:
@@ -243,7 +251,7 @@ def _grasps(draft: _Draft, places: dict[str, FramePose], found: Candidates, worl
         for name, each in draft.objects.items():
             together = held(_in_world(each, places), _in_world(gripper, places))
             if together is not None:
-                options.append((name, together))
+                options.append((name, while_felt(together, draft.wrenches[side].array())))
         if not options:
             continue
         name, best = max(options, key=lambda pair: (pair[1].share, pair[1].end - pair[1].start))

@@ -39,6 +39,13 @@ def mapping_text(proposal: Proposal, source: str, sizes: dict[str, tuple[float, 
         else:
             lines += [f"  # {name}:", f"  #   footprint: {SIZE} # [m] counter-clockwise", "  #   height: 0.7 # [m]"]
         lines.append(f"  {'' if math.isfinite(length) else '# '}  # nominal_mass: 20.0 # [kg] if somebody knows it")
+    sources: list[PoseSource | WrenchSource] = [
+        *mapping.object_poses.values(),
+        *mapping.gripper_poses.values(),
+        *mapping.wrenches.values(),
+    ]
+    if any(each.clock_offset for each in sources):
+        lines += ["", "# clock_offset [s] is added to a stream's times: judged by when it was heard beside the others"]
     lines += ["", "object_poses:"]
     lines += [f"  {name}: {_pose(each)}" for name, each in mapping.object_poses.items()]
     lines += ["", "gripper_poses: # of the force-torque sensor's frame; `offset` where another one was seen"]
@@ -62,12 +69,18 @@ def _is_done(sentence: str, sizes: dict[str, tuple[float, float]]) -> bool:
 
 
 def _pose(source: PoseSource) -> str:
-    told = {"topic": source.topic, "child_frame": source.child_frame, "frame": source.frame}
-    return _flow({key: value for key, value in told.items() if value is not None})
+    told = {"topic": source.topic, "child_frame": source.child_frame, "index": source.index, "frame": source.frame}
+    return _flow({key: value for key, value in told.items() if value is not None} | _clock(source))
 
 
 def _wrench(source: WrenchSource) -> str:
-    return _flow({"topic": source.topic, "exerted_on": source.exerted_on, "axes": source.axes})
+    told = {"topic": source.topic, "exerted_on": source.exerted_on, "axes": source.axes}
+    return _flow(told | _clock(source))
+
+
+def _clock(source: PoseSource | WrenchSource) -> dict[str, float]:
+    """Return what to say of a stream's clock, where it is another than the others'."""
+    return {"clock_offset": source.clock_offset} if source.clock_offset else {}
 
 
 def _place(place: FramePose) -> str:

@@ -16,6 +16,7 @@ from rosgraph_msgs.msg import Clock
 
 from pbrl_bag.errors import BagError
 from pbrl_bag.mcap_file import RawMessage
+from pbrl_bag.names import canonical, in_namespace, namespace_of, relative
 from pbrl_bag.playback import CLOCK_TOPIC, Schedule, latched_before, load_bag
 from pbrl_bag.ros.conversions import message_class, profile_from_qos
 from pbrl_bag.ros.parameters import declare, refuse_unknown
@@ -27,6 +28,8 @@ LONGEST_SLEEP = 0.05  # [s]
 
 class PlayerNode(Node):
     """Publishes the topics of a bag with the QoS they were recorded with.
+
+    In a namespace they are published in it, whatever namespace they were recorded in; in the root as they were.
 
     Raises:
         BagError: the bag cannot be read, a parameter is out of range, a message type is not sourced.
@@ -43,12 +46,13 @@ class PlayerNode(Node):
         if not path:
             raise BagError("bag: expected a bag folder or .mcap file, got none; give -p bag:=FOLDER")
         self.bag = load_bag(path)
+        self._recorded_in = namespace_of(self.bag.topics, path) if self.get_namespace() != "/" else ""
         self.schedule = Schedule([one.log_time for one in self.bag.messages], rate, offset, loop)
         self._publishers_by_topic = {name: self._publisher(name) for name in self.bag.topics}
         for topic in self.awaited:
             if topic not in self._publishers_by_topic:
                 raise BagError(f"wait_for: expected a topic of the bag, got {topic!r}")
-        has_clock = CLOCK_TOPIC in self.bag.topics
+        has_clock = in_namespace(CLOCK_TOPIC, self._recorded_in) in self.bag.topics
         self._clock_publisher = None if has_clock else self.create_publisher(Clock, CLOCK_TOPIC, 10)
         for note in self.bag.notes:
             self.get_logger().warning(note)
@@ -56,7 +60,10 @@ class PlayerNode(Node):
     def _publisher(self, name: str) -> Publisher:
         """Return a publisher as the topic had when it was recorded."""
         topic = self.bag.topics[name]
-        return self.create_publisher(message_class(topic.type), name, profile_from_qos(topic.qos))
+        published = canonical(name, self._recorded_in) or name
+        if self.get_namespace() != "/":
+            published = relative(published)
+        return self.create_publisher(message_class(topic.type), published, profile_from_qos(topic.qos))
 
     def ready(self) -> bool:
         """Tell whether every topic that playing waits for has a subscriber."""

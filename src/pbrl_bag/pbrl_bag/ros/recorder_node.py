@@ -16,6 +16,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from pbrl_bag.errors import BagError
+from pbrl_bag.names import GLOBAL, canonical
 from pbrl_bag.qos import Qos
 from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
 from pbrl_bag.ros.parameters import declare, refuse_unknown
@@ -29,6 +30,9 @@ NOT_RECORDED = ["/parameter_events"]
 class RecorderNode(Node):
     """Subscribes to every topic that is asked for, as soon as somebody publishes it.
 
+    In a namespace that is what lies in it, and clock and transforms as they are remapped for it. Names stay as they
+    are on the wire; patterns are of names as in the root namespace.
+
     Log time is the time of arrival: wall time, or the time of `/clock` under use_sim_time.
 
     Raises:
@@ -37,16 +41,16 @@ class RecorderNode(Node):
 
     def __init__(self, **options: object):
         super().__init__("recorder_node", **options)
-        default = datetime.now().strftime("recording_%Y_%m_%d-%H_%M_%S")
-        self.output = declare(self, "output", default, "bag folder to make; must not exist yet")
+        text = "bag folder to make, which must not exist yet; empty: recording_<date and time>"
+        output = declare(self, "output", "", text)
         self.topics = declare(self, "topics", [], "topics to record, * matches any text; empty: all")
         self.exclude = declare(self, "exclude", NOT_RECORDED, "topics to leave out, * matches any text")
         refuse_unknown(self)
-        if not self.output:
-            raise BagError("output: expected the name of a folder, got an empty text")
+        self.output: str = output or datetime.now().strftime("recording_%Y_%m_%d-%H_%M_%S")
         self.writer = BagWriter(self.output)
         self._heard: dict[str, tuple[Subscription, QoSProfile]] = {}
         self._refused: set[str] = set()
+        self._global = {self.resolve_topic_name(name) for name in GLOBAL}
         self._sim_time = bool(self.get_parameter("use_sim_time").value)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DISCOVERY_SECONDS, self.discover, clock=self._steady)
@@ -54,7 +58,11 @@ class RecorderNode(Node):
         self.get_logger().info(f"recording into {self.output}")
 
     def wants(self, topic: str) -> bool:
-        """Tell whether a topic is to be recorded."""
+        """Tell whether a topic is to be recorded, by its name on the wire."""
+        own = canonical(topic, self.get_namespace())
+        if own is None and topic not in self._global:
+            return False
+        topic = own or topic
         if any(fnmatch.fnmatchcase(topic, pattern) for pattern in self.exclude):
             return False
         return not self.topics or any(fnmatch.fnmatchcase(topic, pattern) for pattern in self.topics)

@@ -25,6 +25,8 @@ BENCHES = {
     "namo": "the planner among movable obstacles: time, unreachable goals, random rooms, against a kinodynamic RRT",
     "lattice": "the lattice planner: cubicles beside SBPL's figures, a cart through narrow doors, what a turn sweeps",
     "next-experiment": "pushes until it is known what was left out, chosen by information or at random",
+    "foreign": "a push as five other laboratories would have recorded it: roles proposed, fitted like the native one",
+    "played-again": "what is learned live, and from the recording of it played again: number for number",
     "view": "the viewer on ten minutes of five objects: first picture, pictures a second, console",
     "mismatch": "the watch over a stream: half an hour of clean pushing without an alarm, and how late alarms are",
 }

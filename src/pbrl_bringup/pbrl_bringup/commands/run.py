@@ -6,26 +6,42 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from pbrl_bringup.graph import load_graph, node_command, parse_setting, running_graph, wait_ready, with_parameters
+from pbrl_bringup.graph import (
+    load_graph,
+    node_command,
+    parse_namespace,
+    parse_setting,
+    running_graph,
+    wait_ready,
+    with_parameters,
+)
 from pbrl_bringup.ros.client import GraphClient
 from pbrl_bringup.terminal import say
 
 
-def command(graph: str, settings: Sequence[str], optional: Sequence[str], domain: int | None, logs: Path) -> int:
+def command(
+    graph: str, settings: Sequence[str], optional: Sequence[str], namespace: str, domain: int | None, logs: Path
+) -> int:
     """Start a graph, say when each node is ready, and stay until Ctrl-C or until a node ends.
 
     Raises:
-        BringupError: no such graph, node or parameter; a node that ends by itself.
+        BringupError: no such graph, node or parameter; a name that is none; a node that ends by itself.
     """
+    robot = parse_namespace(namespace)
+    logs /= robot.strip("/")
     chosen = with_parameters(load_graph(graph), dict(map(parse_setting, settings)), tuple(optional))
     for name, node in chosen.nodes.items():
-        node_command(name, node)  # errors before a word is said
+        node_command(name, node, robot)  # errors before a word is said
     number = int(os.environ.get("ROS_DOMAIN_ID", "0")) if domain is None else domain
     say(f"pbrl: {chosen.description.strip()}")
-    with running_graph(chosen, logs, number) as programs, GraphClient(number, programs.check) as client:
+    with (
+        running_graph(chosen, logs, number, robot) as programs,
+        GraphClient(number, programs.check, robot) as client,
+    ):
         wait_ready(chosen, client)
         try:  # Ctrl-C may come as soon as it is named
-            say(f"pbrl: {', '.join(chosen.nodes)} run in ROS_DOMAIN_ID {number}, output in {logs}; Ctrl-C stops them")
+            where = f"ROS_DOMAIN_ID {number}" + (f", namespace {robot}" if robot else "")
+            say(f"pbrl: {', '.join(chosen.nodes)} run in {where}, output in {logs}; Ctrl-C stops them")
             client.stay()
         except KeyboardInterrupt:
             say("pbrl: stopping")

@@ -27,6 +27,7 @@ def command(
     report: Path | None,
     port: int | None,
     opened: bool | None,
+    namespace: str,
     domain: int | None,
 ) -> int:
     """Serve the page until Ctrl-C.
@@ -38,6 +39,7 @@ def command(
         report: report.json of a diagnosis, or None.
         port: to serve on; see `listening`.
         opened: whether to open a browser; None: where there is a display.
+        namespace: of the robot that is shown live; empty: the root.
         domain: ROS_DOMAIN_ID of the graph; None: the environment's.
 
     Raises:
@@ -52,7 +54,7 @@ def command(
         if show:
             webbrowser.open(address)
 
-    with _source(what, mapping, models, report, domain) as source:
+    with _source(what, mapping, models, report, namespace, domain) as source:
         try:
             serve(make_app(source), listening(port), ready)
         except KeyboardInterrupt:
@@ -62,7 +64,7 @@ def command(
 
 @contextmanager
 def _source(
-    what: str, mapping: Path | None, models: Sequence[Path], report: Path | None, domain: int | None
+    what: str, mapping: Path | None, models: Sequence[Path], report: Path | None, namespace: str, domain: int | None
 ) -> Iterator[Source]:
     """Yield where the page's data come from. What only one kind needs takes seconds to load, and is loaded for it."""
     if what != LIVE:
@@ -74,7 +76,8 @@ def _source(
         raise BringupError(
             "view live: expected no --model, --report or --map: the graph says these; give a BAG for them"
         )
-    graph = LiveGraph("the running graph")
+    robot = import_module("pbrl_bringup.graph").parse_namespace(namespace)
+    graph = LiveGraph(f"the running graph{' of ' if robot else ''}{robot}")
     listener = import_module("pbrl_bringup.ros.view_listener").ViewListener
-    with listener(graph.wants, graph.hear, domain):
+    with listener(graph.wants, graph.hear, domain, robot):
         yield graph

@@ -17,6 +17,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
+from pbrl_bag.names import in_namespace
 from pbrl_bringup.errors import BringupError
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE)
@@ -45,11 +46,13 @@ class GraphClient:
     Args:
         domain: ROS_DOMAIN_ID of the graph.
         check: called while waiting; raises where a node of the graph has died.
+        namespace: of the graph; names of topics and services are given as they are in the root.
     """
 
-    def __init__(self, domain: int, check: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, domain: int, check: Callable[[], None] = lambda: None, namespace: str = "") -> None:
         os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         self._check = check
+        self._namespace = namespace
         self._context = Context()
         # Ctrl-C stays with Python: the caller stops its nodes in order.
         rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
@@ -73,8 +76,12 @@ class GraphClient:
         """Subscribe, and return what holds the last message."""
         heard = Heard()
         qos = LATCHED if latched else QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-        heard.subscription = self._node.create_subscription(kind, topic, heard, qos)
+        heard.subscription = self._node.create_subscription(kind, self.on_the_wire(topic), heard, qos)
         return heard
+
+    def on_the_wire(self, name: str) -> str:
+        """Return the name that a topic or service of the graph has in its namespace."""
+        return in_namespace(name, self._namespace)
 
     def forget(self, heard: Heard) -> None:
         """Stop listening."""
@@ -82,19 +89,27 @@ class GraphClient:
 
     def wait_for_topic(self, topic: str, timeout: float) -> None:
         """Wait until a node publishes a topic."""
-        self.wait_until(lambda: self._node.count_publishers(topic) > 0, timeout, f"nobody publishes {topic}")
+        wanted = self.on_the_wire(topic)
+        self.wait_until(lambda: self._node.count_publishers(wanted) > 0, timeout, f"nobody publishes {wanted}")
+
+    def wait_for_subscribers(self, topic: str, count: int, timeout: float) -> None:
+        """Wait until so many nodes subscribe to a topic."""
+        wanted = self.on_the_wire(topic)
+        complaint = f"{wanted} has fewer than {count} subscribers"
+        self.wait_until(lambda: self._node.count_subscribers(wanted) >= count, timeout, complaint)
 
     def wait_for_service(self, service: str, timeout: float) -> None:
         """Wait until a node offers a service."""
+        wanted = self.on_the_wire(service)
 
         def offered() -> bool:
-            return any(name == service for name, _ in self._node.get_service_names_and_types())
+            return any(name == wanted for name, _ in self._node.get_service_names_and_types())
 
-        self.wait_until(offered, timeout, f"nobody offers {service}")
+        self.wait_until(offered, timeout, f"nobody offers {wanted}")
 
     def call(self, kind: Any, service: str, request: Any, timeout: float) -> Any:
         """Call a service and return its response."""
-        client = self._node.create_client(kind, service)
+        client = self._node.create_client(kind, self.on_the_wire(service))
         try:
             self.wait_until(client.service_is_ready, timeout, f"nobody offers {service}")
             future = client.call_async(request)

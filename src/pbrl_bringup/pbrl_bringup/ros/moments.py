@@ -36,5 +36,5 @@ class MomentsClient(GraphClient):
                 kept.sent.append(1e-9 * info["source_timestamp"])
                 kept.came.append(1e-9 * info["received_timestamp"])
 
-        self._node.create_subscription(kind, topic, take, QUALITY)
+        self._node.create_subscription(kind, self.on_the_wire(topic), take, QUALITY)
         return kept

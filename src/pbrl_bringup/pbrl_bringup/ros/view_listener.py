@@ -19,6 +19,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from pbrl_bag.errors import BagError
+from pbrl_bag.names import canonical
 from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
 
 DISCOVERY_SECONDS = 0.2
@@ -31,12 +32,17 @@ class ViewListener:
         wants: tells which topics to hear.
         hear: takes topic and message, in the thread; a `BagError` is logged once a topic.
         domain: ROS_DOMAIN_ID of the graph; None: the environment's.
+        namespace: of the robot; `wants` and `hear` are given names as they are in the root.
     """
 
     def __init__(
-        self, wants: Callable[[str], bool], hear: Callable[[str, Any], None], domain: int | None = None
+        self,
+        wants: Callable[[str], bool],
+        hear: Callable[[str, Any], None],
+        domain: int | None = None,
+        namespace: str = "",
     ) -> None:
-        self._wants, self._hear = wants, hear
+        self._wants, self._hear, self._namespace = wants, hear, namespace
         self._context = Context()
         # Ctrl-C is the server's.
         rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
@@ -61,7 +67,8 @@ class ViewListener:
     def _discover(self) -> None:
         """Subscribe to what is new, and again where a publisher came whom the old request keeps out."""
         for topic, types in self._node.get_topic_names_and_types():
-            if topic in self._refused or not self._wants(topic):
+            own = canonical(topic, self._namespace)
+            if topic in self._refused or own is None or not self._wants(own):
                 continue
             infos = self._node.get_publishers_info_by_topic(topic)
             profile = profile_that_hears([qos_from_profile(each.qos_profile) for each in infos])
@@ -79,13 +86,13 @@ class ViewListener:
             if known:
                 self._node.destroy_subscription(known[0])
             self._heard[topic] = (
-                self._node.create_subscription(wanted, topic, partial(self._take, topic), profile),
+                self._node.create_subscription(wanted, topic, partial(self._take, topic, own), profile),
                 profile,
             )
 
-    def _take(self, topic: str, message: Any) -> None:
+    def _take(self, topic: str, own: str, message: Any) -> None:
         try:
-            self._hear(topic, message)
+            self._hear(own, message)
         except BagError as error:
             self._refuse(topic, error)
 

@@ -93,31 +93,31 @@ class BodyControllerNode(Node):
             self.create_timer(1.0 / self._rate, self._on_time, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _create_publishers(self) -> None:
-        self._base = self.create_publisher(Twist, "/cmd_vel", COMMANDS)
+        self._base = self.create_publisher(Twist, "cmd_vel", COMMANDS)
         self._arms = {
-            side: self.create_publisher(Float64MultiArray, f"/{side}_arm_velocity_controller/commands", COMMANDS)
+            side: self.create_publisher(Float64MultiArray, f"{side}_arm_velocity_controller/commands", COMMANDS)
             for side in SIDES
         }
-        self._status = self.create_publisher(String, "/body_controller/status", LATCHED)
-        self._share = self.create_publisher(Float64, "/body_controller/share", COMMANDS)
+        self._status = self.create_publisher(String, "body_controller/status", LATCHED)
+        self._share = self.create_publisher(Float64, "body_controller/share", COMMANDS)
 
     def _create_subscriptions(self) -> None:
-        self.create_subscription(String, "/robot_description", self._on_description, LATCHED)
-        self.create_subscription(JointState, "/joint_states", self._on_joints, NEWEST)
-        self.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
-        self.create_subscription(Grasps, "/grasps", self._on_grasps, LATCHED)
-        self.create_subscription(TwistStamped, "/object_twist_command", self._on_twist, COMMANDS)
-        self.create_subscription(Bool, "/emergency_stop", self._on_emergency, LATCHED)
+        self.create_subscription(String, "robot_description", self._on_description, LATCHED)
+        self.create_subscription(JointState, "joint_states", self._on_joints, NEWEST)
+        self.create_subscription(Scene, "scene", self._on_scene, LATCHED)
+        self.create_subscription(Grasps, "grasps", self._on_grasps, LATCHED)
+        self.create_subscription(TwistStamped, "object_twist_command", self._on_twist, COMMANDS)
+        self.create_subscription(Bool, "emergency_stop", self._on_emergency, LATCHED)
         for side in SIDES:
-            self.create_subscription(WrenchStamped, f"/wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
-            expected = f"/expected_grip_wrench/{side}"
+            self.create_subscription(WrenchStamped, f"wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
+            expected = f"expected_grip_wrench/{side}"
             self.create_subscription(WrenchStamped, expected, partial(self._on_expected, side), COMMANDS)
             self._listen_to_tag(gripper_tag(side))
 
     def _listen_to_tag(self, name: str) -> None:
         if name not in self._tag_topics:
             self._tag_topics.add(name)
-            self.create_subscription(PoseStamped, f"/ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
+            self.create_subscription(PoseStamped, f"ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
 
     def _on_description(self, message: String) -> None:
         try:

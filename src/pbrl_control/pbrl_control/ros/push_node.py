@@ -72,12 +72,13 @@ class PushNode(Node):
             self, "trajectory", "", "in place of a plan: name of one in config/params/trajectories, or a path"
         )
         fetch = declare(self, "fetch", False, "drive to the object first, from anywhere in the room")
-        grips = declare(self, "grips", "plan", "of a fetch: plan, as it says; sampled, as the object's model allows")
+        text = "of a fetch: plan, as it says; sampled, as the object's model allows"
+        grips = declare(self, "grips", "plan", text, choices=("plan", "sampled"))
         self._exit = declare(self, "exit_when_done", False, "end with exit code 0 when done, 1 when failed")
         rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (10.0, 200.0))
         refuse_unknown(self)
-        if grips not in ("plan", "sampled") or (grips == "sampled" and not fetch):
-            raise ControlError(f"grips: expected plan, or sampled together with fetch:=true, got {grips!r}")
+        if grips == "sampled" and not fetch:
+            raise ControlError("grips: expected plan, or sampled together with fetch:=true, got sampled alone")
         self._course: TrajectoryCourse | None = None
         self._plan, self._task = self._load(plan, trajectory)
         self._hands = tuple(side for side in SIDES if any(grip.gripper == side for grip in self._plan.grips))
@@ -98,15 +99,14 @@ class PushNode(Node):
         self._subscribe()
         if fetch:
             self._subscribe_to_the_floor()
-        self._status = self.create_publisher(String, "/push/status", LATCHED)
-        self._twist = self.create_publisher(TwistStamped, "/object_twist_command", COMMANDS)
+        self._status = self.create_publisher(String, "push/status", LATCHED)
+        self._twist = self.create_publisher(TwistStamped, "object_twist_command", COMMANDS)
         self._expected = {
-            side: self.create_publisher(WrenchStamped, f"/expected_grip_wrench/{side}", COMMANDS)
-            for side in self._hands
+            side: self.create_publisher(WrenchStamped, f"expected_grip_wrench/{side}", COMMANDS) for side in self._hands
         }
         self._callers: dict[str, Client] = {
-            "grasp": self.create_client(GraspObject, "/grasp"),
-            "release": self.create_client(ReleaseObject, "/release"),
+            "grasp": self.create_client(GraspObject, "grasp"),
+            "release": self.create_client(ReleaseObject, "release"),
         }
         self.create_timer(1.0 / rate, self._tick)
 
@@ -120,28 +120,28 @@ class PushNode(Node):
         return push, SegmentCourse(push)
 
     def _subscribe(self) -> None:
-        self.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
-        self.create_subscription(Grasps, "/grasps", self._on_grasps, LATCHED)
-        self.create_subscription(Float64, "/body_controller/share", self._on_share, NEWEST)
+        self.create_subscription(Scene, "scene", self._on_scene, LATCHED)
+        self.create_subscription(Grasps, "grasps", self._on_grasps, LATCHED)
+        self.create_subscription(Float64, "body_controller/share", self._on_share, NEWEST)
         if self._course is not None or self._sampled is not None:
-            self.create_subscription(ObjectModels, "/object_models", self._on_models, LATCHED)
+            self.create_subscription(ObjectModels, "object_models", self._on_models, LATCHED)
         for side in self._hands:
-            self.create_subscription(WrenchStamped, f"/wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
+            self.create_subscription(WrenchStamped, f"wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
         for name in (self._plan.object, *(gripper_tag(side) for side in self._hands)):
             self._listen_to_tag(name)
 
     def _subscribe_to_the_floor(self) -> None:
         """Listen to what driving needs beyond that."""
-        self.create_subscription(String, "/robot_description", self._on_description, LATCHED)
-        self.create_subscription(JointState, "/joint_states", self._on_joints, NEWEST)
-        self.create_subscription(Odometry, "/odom", self._on_odometry, NEWEST)
+        self.create_subscription(String, "robot_description", self._on_description, LATCHED)
+        self.create_subscription(JointState, "joint_states", self._on_joints, NEWEST)
+        self.create_subscription(Odometry, "odom", self._on_odometry, NEWEST)
         for side in SIDES:
             self._listen_to_tag(gripper_tag(side))
 
     def _listen_to_tag(self, name: str) -> None:
         if name not in self._tag_topics:
             self._tag_topics.add(name)
-            self.create_subscription(PoseStamped, f"/ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
+            self.create_subscription(PoseStamped, f"ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
 
     def _on_description(self, message: String) -> None:
         if self._fetch is not None:
@@ -250,7 +250,7 @@ class PushNode(Node):
     def _ask(self, request: GripperRequest) -> None:
         client = self._callers[request.action]
         if not client.service_is_ready():
-            sentence = f"no service {client.srv_name}; is the simulator or robot running?"
+            sentence = f"no service {client.service_name}; is the simulator or robot running?"
             self._answer(GripperAnswer(request.action, request.side, False, sentence))
             return
         if request.action == "grasp":

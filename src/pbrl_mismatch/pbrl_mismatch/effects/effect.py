@@ -135,6 +135,7 @@ class Effect:
         region: columns of a rectangle on the floor in which feet are held: x, y, half of length and width, and angle.
         pins: columns x and y of a place about which the body can only turn.
         remembers: whether more moves than the body, so that its past matters.
+        second: whether a baseline may have one such thing already, and stands between the two.
         sticks: whether it is dry friction, which a body at rest does not show the strength of.
     """
 
@@ -158,6 +159,7 @@ class Effect:
     region: tuple[str, str, str, str, str] | None = None
     pins: tuple[str, str] | None = None
     remembers: bool = False
+    second: bool = False
     sticks: bool = False
 
     def chosen(self, scene: Scene, variant: int) -> tuple[Parameter, ...]:

@@ -40,5 +40,6 @@ EFFECT = Effect(
     direction="body",
     angles=("wheel2_theta",),
     linear=("wheel2_mu_x", "wheel2_mu_y"),
+    second=True,
     sticks=True,
 )

@@ -19,6 +19,7 @@ from std_srvs.srv import Trigger
 
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
+from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.online.found import Found
 from pbrl_mismatch.online.monitor import MismatchMonitor
@@ -46,25 +47,25 @@ class MismatchNode(Node):
         defaults = MonitorOptions()
         chance = "chance of a false alarm within `horizon` of pushing"
         horizon = "time for which that is promised [s]"
-        keep = "given to a diagnosis of what was heard, in whole holds [s]"
-        gather = "heard after an alarm before the diagnosis begins [s]"
+        keep = "how much of what was heard a diagnosis is given, in whole holds [s]"
+        gather = "time heard after an alarm before the diagnosis begins [s]"
         monitor = MonitorOptions(
             false_alarm=declare(self, "false_alarm", defaults.false_alarm, chance, (1e-9, 0.5)),
             horizon=declare(self, "horizon", defaults.horizon, horizon, (10.0, 1e7)),
-            rest=declare(self, "rest", defaults.rest, "between two alarms about one object [s]", (1.0, 1e6)),
+            rest=declare(self, "rest", defaults.rest, "least time between two alarms about an object [s]", (1.0, 1e6)),
             keep=declare(self, "keep", defaults.keep, keep, (5.0, 600.0)),
             gather=declare(self, "gather", defaults.gather, gather, (0.0, 60.0)),
         )
         diagnosing = declare(self, "diagnose", True, "whether to say what was left out, not only that something was")
-        without: list[str] = declare(self, "without", [], "effects that the library is to do without")
+        without: list[str] = declare(self, "without", [], "effects that the library does without", choices=EFFECTS)
         workers = declare(self, "workers", 1, "threads of a diagnosis", (1, 256))
-        seed = declare(self, "seed", 0, "of every random draw", (0, 2**31 - 1))
-        period = declare(self, "period", 0.1, "between two looks at what has come [s]", (0.01, 1.0))
-        memory = declare(self, "memory", MEMORY, "messages kept for a diagnosis at most [MB]", (1.0, 100_000.0))
+        seed = declare(self, "seed", 0, "seed of every random draw", (0, 2**31 - 1))
+        period = declare(self, "period", 0.1, "time between two looks at what has come [s]", (0.01, 1.0))
+        memory = declare(self, "memory", MEMORY, "most that is kept of messages for a diagnosis [MB]", (1.0, 100_000.0))
         refuse_unknown(self)
         chosen = DiagnoseOptions(without=tuple(without), workers=workers, seed=seed)
-        self._mismatches = self.create_publisher(Mismatches, "/mismatches", LATCHED)
-        self.listener = RecordingListener("mismatch_node_listener", context, memory)
+        self._mismatches = self.create_publisher(Mismatches, "mismatches", LATCHED)
+        self.listener = RecordingListener("mismatch_node_listener", context, memory, self.get_namespace())
         self._watcher = Watcher(
             MismatchMonitor(monitor),
             self.listener,
@@ -73,10 +74,10 @@ class MismatchNode(Node):
             self.get_logger().warning,
             period,
         )
-        self.create_subscription(ObjectModels, "/object_models", self._take_models, LATCHED)
+        self.create_subscription(ObjectModels, "object_models", self._take_models, LATCHED)
         # In a group of its own: the answer comes while whoever asked for the experiment is still waiting.
-        self._pusher = self.create_client(PushObject, "/push", callback_group=ReentrantCallbackGroup())
-        self.create_service(Trigger, "/run_next_experiment", self._run_next_experiment)
+        self._pusher = self.create_client(PushObject, "push", callback_group=ReentrantCallbackGroup())
+        self.create_service(Trigger, "run_next_experiment", self._run_next_experiment)
         self._watcher.start()
         self.listener.start()
 

@@ -128,12 +128,12 @@ def _path_above_simulation(base: Fitted) -> float:
 def _same(name: str, base: Fitted, options: DiagnoseOptions) -> bool:
     """Tell whether an effect on a base is what some baseline is: a first wheel is no second one."""
     wheels = [kind for kind in options.baseline if "wheel" in kind or "caster" in kind]
-    return name == "second_wheel" and bool(wheels) and "wheel_x" not in base.hypothesis.columns
+    return EFFECTS[name].second and bool(wheels) and "wheel_x" not in base.hypothesis.columns
 
 
 def _another(name: str, base: Fitted) -> bool:
     """Tell whether an effect is one more of what a base has already."""
-    return name == "second_wheel" and "wheel_x" in base.hypothesis.columns
+    return EFFECTS[name].second and "wheel_x" in base.hypothesis.columns
 
 
 def _climbed(cuts: Cuts, iterations: int, options: DiagnoseOptions, rough: bool, job: tuple[Hypothesis, Array]) -> Peak:

@@ -17,6 +17,7 @@ from rclpy.subscription import Subscription
 
 from pbrl_bag.builder import RecordingBuilder
 from pbrl_bag.errors import BagError
+from pbrl_bag.names import canonical, relative
 from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
 from pbrl_bag.types import Recording
 from pbrl_model.ros.heard import Heard, Message
@@ -29,6 +30,8 @@ MEMORY = 200.0
 class RecordingListener(Node):
     """Subscribes to every topic that plays a role in a recording, as soon as somebody publishes it.
 
+    Topics are those of its namespace, and are called as in the root one: a robot beside ours is not learned from.
+
     A node of its own with an executor of its own in a thread, so that a fit in the other node's callback does not
     make it deaf. Messages are kept as bytes: some 60 kB for a second of a robot with two wrists. What lies between two
     holds is forgotten, and the oldest of all beyond `memory`; see `Heard`.
@@ -37,10 +40,13 @@ class RecordingListener(Node):
         name: of the node.
         context: the one to join; None: the default one.
         memory: kept at most [MB].
+        namespace: of the robot.
     """
 
-    def __init__(self, name: str, context: Context | None = None, memory: float = MEMORY):
-        super().__init__(name, context=context, start_parameter_services=False, enable_rosout=False)
+    def __init__(self, name: str, context: Context | None = None, memory: float = MEMORY, namespace: str = "/"):
+        super().__init__(
+            name, context=context, namespace=namespace, start_parameter_services=False, enable_rosout=False
+        )
         self._builder = RecordingBuilder()
         self._heard = Heard(round(memory * 1e6))
         self._last: dict[str, tuple[type, bytes]] = {}
@@ -92,10 +98,11 @@ class RecordingListener(Node):
 
     def discover(self) -> None:
         """Subscribe to what is new, and again where a publisher came whom the old request keeps out."""
-        for topic, types in self.get_topic_names_and_types():
-            if topic in self._refused or not self._builder.wants(topic):
+        for found, types in self.get_topic_names_and_types():
+            topic = canonical(found, self.get_namespace())
+            if topic is None or topic in self._refused or not self._builder.wants(topic):
                 continue
-            offered = [qos_from_profile(info.qos_profile) for info in self.get_publishers_info_by_topic(topic)]
+            offered = [qos_from_profile(info.qos_profile) for info in self.get_publishers_info_by_topic(found)]
             if offered:
                 self._subscribe(topic, types, profile_that_hears(offered))
 
@@ -113,7 +120,8 @@ class RecordingListener(Node):
             return
         if known:
             self.destroy_subscription(known[0])
-        subscription = self.create_subscription(kind, topic, partial(self._keep, topic, kind), profile, raw=True)
+        keep = partial(self._keep, topic, kind)
+        subscription = self.create_subscription(kind, relative(topic), keep, profile, raw=True)
         self._subscriptions_by_topic[topic] = (subscription, profile)
 
     def _keep(self, topic: str, kind: type, data: bytes) -> None:

@@ -30,6 +30,7 @@ from pbrl_model.errors import ModelError
 from pbrl_model.fitting.fit import Fit, FitOptions, ObjectFit, fit_recording
 from pbrl_model.online.learner import OnlineLearner, OnlineOptions, adopted
 from pbrl_model.online.state import Stored, load_all, prepare, save
+from pbrl_model.parameters import MODEL_CLASSES
 from pbrl_model.posterior import Posterior
 from pbrl_model.prior_options import PriorOptions, load_prior_options
 from pbrl_model.ros.conversions import models_to_msg
@@ -58,11 +59,12 @@ class ModelNode(Node):
         self._max_draws: int = declare(self, "max_draws", 1000, draws, (1, 100_000))
         priors = declare(self, "priors", "", "YAML file of priors, as config/params/priors.yaml; empty: its defaults")
         online = declare(self, "online", True, "whether to learn while something is held, without being asked")
-        model_class = declare(self, "model_class", "wheel+ground", "what is learned online; as /learn's model_class")
-        particles = declare(self, "particles", 300, "of each object that is learned online", (50, 100_000))
+        text = "what is learned online; as /learn's model_class"
+        model_class = declare(self, "model_class", "wheel+ground", text, choices=MODEL_CLASSES)
+        particles = declare(self, "particles", 300, "particles of each object that is learned online", (50, 100_000))
         period = declare(self, "period", 0.5, "time between two publications while data come [s]", (0.05, 1.0))
         state = declare(self, "state", "", "folder that keeps what was learned, one file an object; empty: nothing")
-        memory = declare(self, "memory", MEMORY, "messages kept for /learn at most [MB]", (1.0, 100_000.0))
+        memory = declare(self, "memory", MEMORY, "most that is kept of messages for /learn [MB]", (1.0, 100_000.0))
         refuse_unknown(self)
         self._priors = load_prior_options(Path(priors)) if priors else PriorOptions()
         fit = FitOptions(model_class=model_class, priors=self._priors)
@@ -73,10 +75,10 @@ class ModelNode(Node):
         self._lock = threading.Lock()
         self._stamp = 0.0
         self._published = 0
-        self._models = self.create_publisher(ObjectModels, "/object_models", LATCHED)
-        self._markers = self.create_publisher(MarkerArray, "/object_models/markers", QoSProfile(depth=1))
-        self.listener = RecordingListener("model_node_listener", context, memory)
-        self.create_service(LearnModel, "/learn", self._learn)
+        self._models = self.create_publisher(ObjectModels, "object_models", LATCHED)
+        self._markers = self.create_publisher(MarkerArray, "object_models/markers", QoSProfile(depth=1))
+        self.listener = RecordingListener("model_node_listener", context, memory, self.get_namespace())
+        self.create_service(LearnModel, "learn", self._learn)
         self.create_timer(MARKER_SECONDS, self._draw, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._serve(stored)
         self._worker = self._start_learning(stored, period) if online else None

@@ -61,12 +61,12 @@ class TagDetectorNode(Node):
         self._places: dict[str, Any] = {}
         self._cameras: dict[str, CameraCalibration] = {}
         self._outputs: dict[str, Any] = {}
-        self.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
+        self.create_subscription(Scene, "scene", self._on_scene, LATCHED)
         self.create_subscription(TFMessage, "/tf_static", self._on_frames, FRAMES)
         reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
         pictures = QoSProfile(depth=2, reliability=reliability)  # a late picture is of no use
         for name in names:
-            topic = f"/camera/{name}"
+            topic = f"camera/{name}"
             self.create_subscription(
                 CameraInfo, f"{topic}/camera_info", lambda message, name=name: self._on_info(name, message), pictures
             )
@@ -119,7 +119,7 @@ class TagDetectorNode(Node):
     def _publish(self, stamp: float, readings: list[BodyReading]) -> None:
         for reading in readings:
             if reading.name not in self._outputs:
-                self._outputs[reading.name] = self.create_publisher(PoseStamped, f"/ar_tags/{reading.name}/pose", TAGS)
+                self._outputs[reading.name] = self.create_publisher(PoseStamped, f"ar_tags/{reading.name}/pose", TAGS)
             message = PoseStamped()
             message.header.frame_id = "world"
             message.header.stamp = _stamp(stamp)

@@ -34,7 +34,7 @@ class GoalServer:
         self._server = ActionServer(
             node,
             ReachGoal,
-            "/reach_goal",
+            "reach_goal",
             execute_callback=lambda _: ReachGoal.Result(),
             goal_callback=self._on_goal,
             handle_accepted_callback=self._on_accepted,

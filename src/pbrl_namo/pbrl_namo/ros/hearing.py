@@ -13,6 +13,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
+from pbrl_bag.names import relative
 from pbrl_control.errors import ControlError
 from pbrl_control.kinematics import SIDES, Posture
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag
@@ -58,13 +59,13 @@ class Hearing:
         self._grips: dict[str, Grip] = {}
         self._bodies: dict[str, BodyShape] = {}
         self._share = 1.0
-        node.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
-        node.create_subscription(Grasps, "/grasps", self._on_grasps, LATCHED)
-        node.create_subscription(JointState, JOINT_STATES, self._on_joints, NEWEST)
-        node.create_subscription(Odometry, "/odom", self._on_odometry, NEWEST)
-        node.create_subscription(Float64, SHARE, self._on_share, NEWEST)
+        node.create_subscription(Scene, "scene", self._on_scene, LATCHED)
+        node.create_subscription(Grasps, "grasps", self._on_grasps, LATCHED)
+        node.create_subscription(JointState, relative(JOINT_STATES), self._on_joints, NEWEST)
+        node.create_subscription(Odometry, "odom", self._on_odometry, NEWEST)
+        node.create_subscription(Float64, relative(SHARE), self._on_share, NEWEST)
         for side in SIDES:
-            node.create_subscription(WrenchStamped, f"/wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
+            node.create_subscription(WrenchStamped, f"wrist_ft/{side}", partial(self._on_wrench, side), NEWEST)
             self._listen_to_tag(gripper_tag(side))
 
     def percept(self, now: float) -> Percept:
@@ -77,7 +78,7 @@ class Hearing:
     def _listen_to_tag(self, name: str) -> None:
         if name not in self._tag_topics:
             self._tag_topics.add(name)
-            topic = f"/ar_tags/{name}/pose"
+            topic = f"ar_tags/{name}/pose"
             self._node.create_subscription(PoseStamped, topic, partial(self._on_tag, name), NEWEST)
 
     def _on_scene(self, message: Scene) -> None:

@@ -27,6 +27,7 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
+from pbrl_bag.names import relative
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
 from pbrl_bag.ros.stopping import spin_in_order
@@ -74,14 +75,14 @@ class NamoNode(Node):
         super().__init__("namo_node")
         goal = declare(self, "goal", "", '"x y" or "x y theta" in world [m, rad], at once; empty: wait for one')
         rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (10.0, 200.0))
-        self._seed = declare(self, "seed", 0, "of every draw, for goals that bring none", (0, 2**31 - 1))
-        memory = declare(self, "memory", MEMORY, "of what was heard while something was held [MB]", (10.0, 4000.0))
+        self._seed = declare(self, "seed", 0, "seed of every draw, for goals that bring none", (0, 2**31 - 1))
+        memory = declare(self, "memory", MEMORY, "most that is kept of what was heard [MB]", (10.0, 4000.0))
         refuse_unknown(self)
         self._first = goal_from_text(goal) if goal else None
         self._settings = load_section(
             params_folder("settings") / "body_controller.yaml", ControllerSettings, "settings"
         )
-        self._listener = RecordingListener(f"{self.get_name()}_listener", self.context, memory)
+        self._listener = RecordingListener(f"{self.get_name()}_listener", self.context, memory, self.get_namespace())
         self._planned = Planned(Thoughts(lambda begin, end: self._listener.recording()))
         self._thinker = PoolThinker(self._planned, lambda: ThreadPoolExecutor(1))
         self._kinematics: RobotKinematics | None = None
@@ -96,8 +97,8 @@ class NamoNode(Node):
         self._drawing = Drawing()
         self._live = Liveness((JOINT_STATES, SHARE, GRASP_SERVICE), GONE)
         self._hearing = Hearing(self, self._on_scene, self._on_odometry, self._live.heard)
-        self.create_subscription(String, "/robot_description", self._on_description, LATCHED)
-        self.create_subscription(ObjectModels, "/object_models", self._on_models, LATCHED)
+        self.create_subscription(String, "robot_description", self._on_description, LATCHED)
+        self.create_subscription(ObjectModels, "object_models", self._on_models, LATCHED)
         self._create_outputs()
         self._listener.start()
         self._warming = compile_in_background()
@@ -118,15 +119,15 @@ class NamoNode(Node):
         super().destroy_node()
 
     def _create_outputs(self) -> None:
-        self._status = self.create_publisher(NamoStatus, "/namo/status", LATCHED)
-        self._markers = self.create_publisher(MarkerArray, "/markers", COMMANDS)
-        self._twist = self.create_publisher(TwistStamped, "/object_twist_command", COMMANDS)
+        self._status = self.create_publisher(NamoStatus, "namo/status", LATCHED)
+        self._markers = self.create_publisher(MarkerArray, "markers", COMMANDS)
+        self._twist = self.create_publisher(TwistStamped, "object_twist_command", COMMANDS)
         self._expected = {
-            side: self.create_publisher(WrenchStamped, f"/expected_grip_wrench/{side}", COMMANDS) for side in SIDES
+            side: self.create_publisher(WrenchStamped, f"expected_grip_wrench/{side}", COMMANDS) for side in SIDES
         }
         self._callers: dict[str, Client] = {
-            "grasp": self.create_client(GraspObject, GRASP_SERVICE),
-            "release": self.create_client(ReleaseObject, "/release"),
+            "grasp": self.create_client(GraspObject, relative(GRASP_SERVICE)),
+            "release": self.create_client(ReleaseObject, "release"),
         }
 
     # What comes in
@@ -140,7 +141,7 @@ class NamoNode(Node):
             self.get_logger().error(str(error))
             return
         self._goals = GoalServer(self, self._aim, self._cancel)
-        self.create_subscription(PoseStamped, "/goal_pose", self._on_goal_pose, COMMANDS)
+        self.create_subscription(PoseStamped, "goal_pose", self._on_goal_pose, COMMANDS)
         if self._first is not None:
             self._aim(self._first, self._seed)
 
@@ -281,7 +282,7 @@ class NamoNode(Node):
     def _ask(self, request: GripperRequest) -> None:
         client = self._callers[request.action]
         if not client.service_is_ready():
-            self._no_answer(request, f"no service {client.srv_name}; is the simulator or robot running?")
+            self._no_answer(request, f"no service {client.service_name}; is the simulator or robot running?")
             return
         if request.action == "grasp":
             call = client.call_async(GraspObject.Request(gripper=request.side, object=request.object))

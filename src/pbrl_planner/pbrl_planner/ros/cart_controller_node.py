@@ -77,26 +77,26 @@ class CartControllerNode(Node):
         self._cancelled = False
         self._at = 0.0
         self._create_outputs()
-        self.create_subscription(String, "/robot_description", self._on_description, LATCHED)
-        self.create_subscription(JointState, "/joint_states", self._on_joints, NEWEST)
-        self.create_subscription(OccupancyGrid, "/local_costmap/costmap", self._on_costmap, LATCHED)
+        self.create_subscription(String, "robot_description", self._on_description, LATCHED)
+        self.create_subscription(JointState, "joint_states", self._on_joints, NEWEST)
+        self.create_subscription(OccupancyGrid, "local_costmap/costmap", self._on_costmap, LATCHED)
         self.create_timer(self._settings.period, self._tick)
 
     def _create_outputs(self) -> None:
-        self._base = self.create_publisher(Twist, "/cmd_vel", COMMANDS)
+        self._base = self.create_publisher(Twist, "cmd_vel", COMMANDS)
         self._out = {
-            side: self.create_publisher(Float64MultiArray, f"/{side}_arm_velocity_controller/commands", COMMANDS)
+            side: self.create_publisher(Float64MultiArray, f"{side}_arm_velocity_controller/commands", COMMANDS)
             for side in SIDES
         }
         self._goals = OneGoal(
             self,
             FollowCartPath,
-            "/follow_cart_path",
+            "follow_cart_path",
             self._want,
             self._cancel,
             lambda why: FollowCartPath.Result(outcome=FollowCartPath.Result.STOPPED, message=why),
         )
-        self._say = Saying(self, "/cart_controller/status", "no path yet")
+        self._say = Saying(self, "cart_controller/status", "no path yet")
 
     def destroy_node(self) -> None:
         """Stand, and leave the graph."""

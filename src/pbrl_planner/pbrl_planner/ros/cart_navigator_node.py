@@ -60,23 +60,23 @@ class CartNavigatorNode(Node):
         self._drive: _Drive | None = None
         self._mending = False
         self._epsilon = self._remaining = 0.0
-        self._planner = ActionClient(self, PlanCartPath, "/plan_cart_path")
-        self._driver = ActionClient(self, FollowCartPath, "/follow_cart_path")
+        self._planner = ActionClient(self, PlanCartPath, "plan_cart_path")
+        self._driver = ActionClient(self, FollowCartPath, "follow_cart_path")
         self._mend = {
-            Order.CLEAR: self.create_client(Trigger, "/costmaps/clear"),
-            Order.FORGET: self.create_client(Trigger, "/costmaps/forget_unseen"),
+            Order.CLEAR: self.create_client(Trigger, "costmaps/clear"),
+            Order.FORGET: self.create_client(Trigger, "costmaps/forget_unseen"),
         }
         self._goals = OneGoal(
             self,
             NavigateCart,
-            "/navigate_cart",
+            "navigate_cart",
             lambda request: self._aim(request.goal),
             self._cancel,
             lambda why: NavigateCart.Result(success=False, message=why),
         )
-        self.create_subscription(PoseStamped, "/goal_pose", self._on_goal_pose, COMMANDS)
+        self.create_subscription(PoseStamped, "goal_pose", self._on_goal_pose, COMMANDS)
         self.create_timer(TICK, self._tick)
-        self._say = Saying(self, "/cart_navigator/status", "waiting for a goal on /goal_pose")
+        self._say = Saying(self, "cart_navigator/status", "waiting for a goal on /goal_pose")
 
     def destroy_node(self) -> None:
         """Leave the graph."""

@@ -43,20 +43,20 @@ class CostmapNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("costmap_node", **options)
         self._settings = declare_settings(self)
-        rate = declare(self, "rate", 2.0, "of the global costmap, on the node's clock [Hz]", (0.1, 20.0))
+        rate = declare(self, "rate", 2.0, "rate of the global costmap, on the node's clock [Hz]", (0.1, 20.0))
         refuse_unknown(self)
         self.tracker, self._frames = CartTracker(), Frames()
         self._static: StaticMap | None = None
         self._local = Costmap(self._settings.local_costmap)
         self._global: Costmap | None = None
-        self._local_out = self.create_publisher(OccupancyGrid, "/local_costmap/costmap", LATCHED)
-        self._global_out = self.create_publisher(OccupancyGrid, "/global_costmap/costmap", LATCHED)
+        self._local_out = self.create_publisher(OccupancyGrid, "local_costmap/costmap", LATCHED)
+        self._global_out = self.create_publisher(OccupancyGrid, "global_costmap/costmap", LATCHED)
         self._hearing = Hearing(self, self.tracker, self._begin_again)
         self.create_subscription(TFMessage, "/tf_static", self._frames.hear, STATIC)
-        self.create_subscription(OccupancyGrid, "/map", self._on_map, LATCHED)
-        self.create_subscription(LaserScan, "/scan", self._on_scan, NEWEST)
-        self.create_service(Trigger, "/costmaps/clear", self._clear)
-        self.create_service(Trigger, "/costmaps/forget_unseen", self._forget_unseen)
+        self.create_subscription(OccupancyGrid, "map", self._on_map, LATCHED)
+        self.create_subscription(LaserScan, "scan", self._on_scan, NEWEST)
+        self.create_service(Trigger, "costmaps/clear", self._clear)
+        self.create_service(Trigger, "costmaps/forget_unseen", self._forget_unseen)
         self.create_timer(1.0 / rate, self._tell_global)
 
     def _begin_again(self) -> None:

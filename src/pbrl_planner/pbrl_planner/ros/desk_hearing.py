@@ -65,13 +65,13 @@ class DeskHearing:
         self._finder: ItemFinder | None = None
         self._seen: dict[str, Array] = {}
         self._stamps: dict[str, float] = {}
-        node.create_subscription(String, "/robot_description", self._on_description, LATCHED)
-        node.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
+        node.create_subscription(String, "robot_description", self._on_description, LATCHED)
+        node.create_subscription(Scene, "scene", self._on_scene, LATCHED)
         node.create_subscription(TFMessage, "/tf_static", self._on_frames, FRAMES)
-        node.create_subscription(JointState, "/joint_states", self._on_joints, NEWEST)
+        node.create_subscription(JointState, "joint_states", self._on_joints, NEWEST)
         if camera:
-            node.create_subscription(CameraInfo, f"/camera/{camera}/camera_info", self._on_info, PICTURES)
-            node.create_subscription(Image, f"/camera/{camera}/image_raw", self._on_image, PICTURES)
+            node.create_subscription(CameraInfo, f"camera/{camera}/camera_info", self._on_info, PICTURES)
+            node.create_subscription(Image, f"camera/{camera}/image_raw", self._on_image, PICTURES)
 
     def missing(self) -> str:
         """Return what was not heard yet, in words; empty where everything was."""
@@ -124,7 +124,7 @@ class DeskHearing:
         if not self._camera:
             for body in message.bodies:
                 if body.movable:
-                    topic = f"/ar_tags/{body.name}/pose"
+                    topic = f"ar_tags/{body.name}/pose"
                     self._node.create_subscription(PoseStamped, topic, partial(self._on_pose, body.name), PICTURES)
 
     def _on_frames(self, message: TFMessage) -> None:

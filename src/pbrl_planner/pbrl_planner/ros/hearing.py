@@ -36,12 +36,12 @@ class Hearing:
 
     def __init__(self, node: Node, tracker: CartTracker, again: Callable[[], None] = lambda: None) -> None:
         self._node, self._tracker, self._again = node, tracker, again
-        node.create_subscription(Odometry, "/odom", self._on_odometry, STREAM)
-        node.create_subscription(PoseWithCovarianceStamped, "/amcl_pose", self._on_pose, STREAM)
-        node.create_subscription(Scene, "/scene", self._on_scene, LATCHED)
-        node.create_subscription(Grasps, "/grasps", self._on_grasps, LATCHED)
+        node.create_subscription(Odometry, "odom", self._on_odometry, STREAM)
+        node.create_subscription(PoseWithCovarianceStamped, "amcl_pose", self._on_pose, STREAM)
+        node.create_subscription(Scene, "scene", self._on_scene, LATCHED)
+        node.create_subscription(Grasps, "grasps", self._on_grasps, LATCHED)
         for source in SOURCES:
-            node.create_subscription(PoseStamped, f"/cart_pose/{source}", partial(self._on_cart, source), STREAM)
+            node.create_subscription(PoseStamped, f"cart_pose/{source}", partial(self._on_cart, source), STREAM)
 
     def _on_odometry(self, message: Odometry) -> None:
         try:

@@ -65,16 +65,16 @@ class LatticePlannerNode(Node):
         self._news: SimpleQueue[LatticePlan] = SimpleQueue()
         self._unwanted = False
         self._asked = 0.0
-        self._plan_out = self.create_publisher(PathMsg, "/plan", LATCHED)
-        self._markers = self.create_publisher(MarkerArray, "/markers", COMMANDS)
-        self.create_subscription(OccupancyGrid, "/global_costmap/costmap", self._on_costmap, LATCHED)
+        self._plan_out = self.create_publisher(PathMsg, "plan", LATCHED)
+        self._markers = self.create_publisher(MarkerArray, "markers", COMMANDS)
+        self.create_subscription(OccupancyGrid, "global_costmap/costmap", self._on_costmap, LATCHED)
         self._prepared: Future[object] | None = None
         self._looks = self.create_timer(1.0 / LOOKS, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._looks.cancel()
         self._goals = OneGoal(
             self,
             PlanCartPath,
-            "/plan_cart_path",
+            "plan_cart_path",
             self._want,
             self._cancel,
             lambda why: PlanCartPath.Result(outcome=PlanCartPath.Result.STOPPED, message=why),

@@ -50,7 +50,7 @@ TICK = 0.01
 """[s] of the node's clock."""
 SILENT = 2.0
 """Without the arm's joints for so long [s] nothing is moved any more."""
-OUTPUT = "/ball_arm_position_controller/commands"
+OUTPUT = "ball_arm_position_controller/commands"
 
 
 @dataclass
@@ -74,9 +74,9 @@ class TabletopNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("tabletop_node", **options)
         camera = declare(self, "camera", "overhead_0", "overhead camera; empty: poses on /ar_tags/<item>/pose")
-        kind = declare(self, "forward_model", "tables", f"what pushes do is known as: {' or '.join(FORWARD_MODELS)}")
+        kind = declare(self, "forward_model", "tables", "what pushes do is known as", choices=FORWARD_MODELS)
         model = declare(self, "model", "", "JSON of what pushes do; read at the start, written when it was learned")
-        self._think = declare(self, "think", 2.0, "seconds for a plan", (0.05, 600.0))
+        self._think = declare(self, "think", 2.0, "time for a plan [s]", (0.05, 600.0))
         refuse_unknown(self)
         self._planning = TabletopSettings()
         self._known = Knowledge(kind, self._planning.travels, file=Path(model) if model else None)
@@ -86,12 +86,12 @@ class TabletopNode(Node):
         self._executive: DeskExecutive | None = None
         self._hearing = DeskHearing(self, camera, self._on_look)
         self._arm = self.create_publisher(Float64MultiArray, OUTPUT, COMMANDS)
-        self._drawing = self.create_publisher(MarkerArray, "/markers", COMMANDS)
+        self._drawing = self.create_publisher(MarkerArray, "markers", COMMANDS)
         self._goals = OneGoal(
-            self, Tidy, "/tidy", self._on_goal, self._cancel, lambda why: Tidy.Result(message=why, cost=math.nan)
+            self, Tidy, "tidy", self._on_goal, self._cancel, lambda why: Tidy.Result(message=why, cost=math.nan)
         )
         self.create_timer(TICK, self._tick)
-        self._say = Saying(self, "/tabletop/status", "waits for a goal on /tidy")
+        self._say = Saying(self, "tabletop/status", "waits for a goal on /tidy")
 
     @property
     def thinking(self) -> bool:

@@ -21,7 +21,7 @@ from pbrl_planner.tabletop.planner import TabletopPlanner, push_tables
 from pbrl_planner.tabletop.primitives import Push, displacement, pushes_of
 from pbrl_planner.tabletop.settings import TabletopSettings
 from pbrl_planner.tabletop.task import Ended, Ending, NextPush
-from pbrl_planner.tabletop.tree_kernel import follow
+from pbrl_planner.tabletop.tree_kernel import follow_what_is_free
 
 CLOSEST = 0.001
 """[m] that the rest of a plan has to keep from everything to be gone on with."""
@@ -131,17 +131,19 @@ class Tidying:
         self._made = None
 
     def _still_good(self, layout: Array) -> bool:
-        """Say whether the rest of the plan is free from here, and ends about as well as was planned."""
+        """Say whether the rest of the plan ends about as well as was planned, without what is no longer free in it."""
         if not len(self._left) or self.plan is None:
             return False
         # What was kept free around each push was for this: it may be used up by what came out otherwise.
         bare = self.planning.model_copy(update={"margin": CLOSEST, "sureness": 0.0})
         tables = push_tables(self.desk, self.model, self.kinds, bare)
-        end = np.empty_like(layout)
-        if not follow(layout, self._left, np.ones(len(self._left), dtype=np.uint8), tables, end):
-            return False
+        end, free = np.empty_like(layout), np.empty(len(self._left), dtype=np.uint8)
+        follow_what_is_free(layout, self._left, free, tables, end)
         slack = self.settings.slack
-        return self.objective(end) <= max(self.plan.cost + slack, self.enough) + slack
+        if not free.any() or self.objective(end) > max(self.plan.cost + slack, self.enough) + slack:
+            return False
+        self._left = self._left[free > 0]
+        return True
 
     def _replan(self, layout: Array) -> None:
         self.replans += 1

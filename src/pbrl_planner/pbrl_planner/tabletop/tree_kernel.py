@@ -250,3 +250,24 @@ def follow(start: Array, sequence: Index, keep: Flags, tables: PushTables, layou
                 return False
             layout[item] = new
     return True
+
+
+@njit(cache=True, error_model="numpy")
+def follow_what_is_free(start: Array, sequence: Index, keep: Flags, tables: PushTables, layout: Array) -> None:
+    """Make pushes one after the other, but for those that are not free, and write the layout then.
+
+    Args:
+        start: (n, 3)
+        sequence: (m,) item times k plus push.
+        keep: (m,) out: which were made.
+        tables: see there.
+        layout: (n, 3) out.
+    """
+    pushes = tables.clearance.shape[1]
+    new = np.empty(3)
+    layout[:] = start
+    for m in range(len(sequence)):
+        item, push = sequence[m] // pushes, sequence[m] % pushes
+        keep[m] = push_fault(layout, item, push, tables, new) == 0
+        if keep[m]:
+            layout[item] = new

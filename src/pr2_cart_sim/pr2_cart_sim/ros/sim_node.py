@@ -7,6 +7,7 @@ controllers, `/torso_velocity_controller/commands` (1 value) and `/head_velocity
 from __future__ import annotations
 
 import threading
+from typing import get_args
 
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64MultiArray
@@ -17,6 +18,7 @@ from bullet_sim.ros.running import run_node
 from pr2_cart_sim.errors import Pr2Error
 from pr2_cart_sim.messages import LATCHED, MESSAGE_TYPES
 from pr2_cart_sim.scene import OfficeScene, load_office, with_board
+from pr2_cart_sim.sensor_settings import BoardSource
 from pr2_cart_sim.session import Pr2Session
 
 
@@ -36,15 +38,15 @@ class SimNode(PacedSimulator):
         self.session = Pr2Session(scene, seed=seed, gui=gui)
         self.start(self.session, MESSAGE_TYPES, LATCHED)
         self.obey_arms(self.session)
-        self.listen(Twist, "/cmd_vel", self._command_base)
-        self.listen(Float64MultiArray, "/torso_velocity_controller/commands", self._command_torso)
-        self.listen(Float64MultiArray, "/head_velocity_controller/commands", self._command_head)
+        self.listen(Twist, "cmd_vel", self._command_base)
+        self.listen(Float64MultiArray, "torso_velocity_controller/commands", self._command_torso)
+        self.listen(Float64MultiArray, "head_velocity_controller/commands", self._command_head)
 
     def _declare(self) -> tuple[OfficeScene, int, bool]:
         """Declare every parameter; return scene, seed and gui."""
         scene = declare(self, "scene", "office", "scene file, or the name of an office of the workspace")
-        text = "noise, rendered or off: how the cart's checkerboard is seen; empty: as the scene says"
-        board = declare(self, "checkerboard", "", text)
+        text = "how the cart's checkerboard is seen; empty: as the scene says"
+        board = declare(self, "checkerboard", "", text, choices=(*get_args(BoardSource), ""))
         seed = declare(self, "seed", 0, "seed of every random draw", (0, 2**31 - 1))
         gui = declare(self, "gui", False, "open Bullet's window")
         self.declare_pace()

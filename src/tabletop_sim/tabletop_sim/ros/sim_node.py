@@ -14,12 +14,11 @@ from std_msgs.msg import Float64MultiArray
 from bullet_sim.ros.paced import PacedSimulator
 from bullet_sim.ros.parameters import declare, refuse_unknown
 from bullet_sim.ros.running import run_node
-from tabletop_sim.errors import TabletopError
 from tabletop_sim.messages import LATCHED, message_types
 from tabletop_sim.scene import DeskScene, Vision, load_desk
 from tabletop_sim.session import DeskSession
 
-COMMANDS = "/ball_arm_position_controller/commands"
+COMMANDS = "ball_arm_position_controller/commands"
 
 
 class SimNode(PacedSimulator):
@@ -45,13 +44,11 @@ class SimNode(PacedSimulator):
         text = (
             "rendered: pictures on /camera/overhead_0; noise: poses on /ar_tags/<item>/pose; empty: as the scene says"
         )
-        vision = declare(self, "vision", "", text)
+        vision = declare(self, "vision", "", text, choices=(*get_args(Vision), ""))
         seed = declare(self, "seed", 0, "seed of every random draw", (0, 2**31 - 1))
         gui = declare(self, "gui", False, "open Bullet's window")
         self.declare_pace()
         refuse_unknown(self)
-        if vision not in ("", *get_args(Vision)):
-            raise TabletopError(f"vision: expected {' or '.join(get_args(Vision))}, got {vision!r}")
         scene = load_desk(name)
         if vision:
             scene = scene.model_copy(update={"vision": scene.vision.model_copy(update={"source": vision})})

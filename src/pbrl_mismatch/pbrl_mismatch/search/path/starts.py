@@ -19,6 +19,7 @@ from pbrl_mismatch.search.path.pulls import with_pulls
 from pbrl_mismatch.search.path.regions import tile_friction, with_regions
 from pbrl_mismatch.search.path.rhythms import with_rhythms
 from pbrl_mismatch.search.path.screen import screen
+from pbrl_mismatch.search.path.splits import with_splits
 from pbrl_model.kernel import GRAVITY
 
 Array = NDArray[np.float64]
@@ -107,6 +108,8 @@ def _drawn(
         point = (at[0], at[1]) if at else None
         cord = columns.index(effect.cord) if effect.cord else None
         draws = with_pulls(rng, draws, (x, y), point, cord, track, lacks)
+    if effect.second:
+        draws = with_splits(rng, draws, columns, scene_of(track, base.row).size)
     if effect.pins is not None:
         draws = with_pins(rng, draws, (columns.index(effect.pins[0]), columns.index(effect.pins[1])), track)
     if effect.region is not None:
