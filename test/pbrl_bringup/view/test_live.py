@@ -135,7 +135,7 @@ def browser() -> Iterator[Browser]:
 
 def test_the_page_follows_and_comes_back(browser: Browser) -> None:
     graph = told()
-    clock = "parseFloat(document.querySelector('.clock').textContent)"
+    clock = "parseFloat(document.querySelector('.clock')?.textContent)"
     with serving(make_app(graph)) as address:
         port = int(address.rstrip("/").rpartition(":")[2])
         browser.open(address)
@@ -150,7 +150,7 @@ def test_the_page_follows_and_comes_back(browser: Browser) -> None:
         assert browser.run(clock) == 0.0, "who looks at the beginning is not carried off"
         browser.click("#follow")
         browser.wait(f"{clock} > 4.8")
-    browser.wait("document.querySelector('#state').textContent.includes('trying again')")
+    browser.wait("document.querySelector('#state')?.textContent.includes('trying again')")
     tell(graph, 15.0, 16.0)
     with serving(make_app(graph), port):
         browser.wait(f"{clock} > 5.8")

@@ -2,6 +2,8 @@
 
 const byId = (id) => document.getElementById(id);
 
+function count(list, what) { return `${list.length} ${what}${list.length === 1 ? "" : "s"}`; }
+
 async function fetched(address) {
   const answer = await fetch(address);
   if (!answer.ok) throw new Error(`${address}: ${answer.status}`);
@@ -41,8 +43,10 @@ function begin(data) {
   }
 
   function tellState(text) {
+    // A clock that counts from 1970 is told as a date, one that counts from a start as it is.
+    const from = data.origin > 1e8 ? new Date(1000 * data.origin).toISOString().replace("T", " ").slice(0, 19) + " UTC" : `${trim(data.origin.toFixed(3))} s`;
     const held = data.live ? "live" : `${data.end.toFixed(1)} s`;
-    byId("state").textContent = text || `${held}, ${data.objects.length} objects, ${data.grippers.length} grippers`;
+    byId("state").textContent = text || `${held} since ${from}, ${count(data.objects, "object")}, ${count(data.grippers, "gripper")}`;
   }
 
   function draw() {

@@ -11,14 +11,17 @@ function makeStreams(data) {
   async function ask(name, from, to, most) {
     if (waiting[name]) { waiting[name] = [from, to, most]; return false; }
     waiting[name] = [from, to, most];
-    let asked;
-    do {
-      asked = waiting[name];
-      const answer = await fetch(`detail?from=${asked[0]}&to=${asked[1]}&most=${asked[2]}`);
-      if (!answer.ok) throw new Error(`/detail: ${answer.status}`);
-      layers[name] = await answer.json();
-    } while (waiting[name] !== asked);
-    waiting[name] = null;
+    try {
+      let asked;
+      do {
+        asked = waiting[name];
+        const answer = await fetch(`detail?from=${asked[0]}&to=${asked[1]}&most=${asked[2]}`);
+        if (!answer.ok) throw new Error(`/detail: ${answer.status}`);
+        layers[name] = await answer.json();
+      } while (waiting[name] !== asked);
+    } finally {
+      waiting[name] = null;
+    }
     return true;
   }
 

@@ -89,7 +89,7 @@ function makeScene(svg, data, streams, forces, kept) {
     const [x, y] = view.map([0, 0]);
     floor.setAttribute("transform", `matrix(${view.scale} 0 0 ${-view.scale} ${x} ${y})`);
     svg.style.setProperty("--px", String(1000 / view.scale)); // a pixel in the millimetres of posteriors
-    grid.setAttribute("d", gridLines(view, 8));
+    grid.setAttribute("d", gridLines(view, 14));
     if (scale) scale.remove();
     scale = element(svg, "g");
     scaleBar(scale, view);
