@@ -27,6 +27,8 @@ def test_a_clean_recording_is_told_to_be_one(bag: Path, tmp_path: Path) -> None:
     found = report["objects"]["table"]
     assert found["mismatch"] is False and found["p_value"] > 0.05 and found["effects"] == []
     assert found["heldout"]["rmse_position_m"]["baseline"] == found["heldout"]["rmse_position_m"]["repaired"]
+    lacking = json.loads((tmp_path / "found" / "residual.json").read_text())["objects"]["table"]
+    assert len(lacking["time"]) == len(lacking["wrench"]) == len(lacking["sd"]) > 100
     page = (tmp_path / "found" / "report.html").read_text()
     assert page.count("<svg") >= 3 and 'href="http' not in page and "src=" not in page
 

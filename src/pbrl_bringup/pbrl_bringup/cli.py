@@ -17,7 +17,25 @@ import typer
 from typer.exceptions import TyperException
 
 from pbrl_bringup.cli_errors import complain, complain_of
-from pbrl_bringup.cli_options import Bag, Domain, Engine, Form, Likelihood, Many, Mapping, Namespace, Out, Sampler, Seed
+from pbrl_bringup.cli_options import (
+    Bag,
+    Diagnosis,
+    Domain,
+    Draws,
+    Engine,
+    Form,
+    Likelihood,
+    Many,
+    Mapping,
+    Models,
+    Namespace,
+    Opened,
+    Out,
+    Port,
+    Quick,
+    Sampler,
+    Seed,
+)
 
 STOPPED = 130  # what Ctrl-C ends with; typer itself turns it into this code
 
@@ -74,10 +92,7 @@ def fit(
     engine: Annotated[
         Engine, typer.Option(help="What simulates: the compiled kernel, or pymunk, the thesis's way and far slower.")
     ] = Engine.KERNEL,
-    draws: Annotated[
-        int | None,
-        typer.Option(min=10, help="Posterior draws to keep from each of 4 chains, or a quarter of all. Default: 500."),
-    ] = None,
+    draws: Draws = None,
     priors: Annotated[
         Path | None, typer.Option(help="YAML file of priors, as config/params/priors.yaml. Default: what stands there.")
     ] = None,
@@ -210,26 +225,24 @@ def view(
         str, typer.Argument(metavar="[BAG|live]", help="A recording as for fit, or live: the running graph.")
     ] = "live",
     mapping: Mapping = None,
-    model: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Learned model to draw: posterior_NAME.nc of fit or model_NAME.json of diagnose; repeatable."
-        ),
-    ] = None,
-    report: Annotated[
-        Path | None, typer.Option(help="report.json of diagnose: what was left out, where, and the missing force.")
-    ] = None,
-    port: Annotated[
-        int | None, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0: any. Default: 8765, or any.")
-    ] = None,
-    open_: Annotated[
-        bool | None, typer.Option("--open/--no-open", help="Open a browser. Default: where there is a display.")
-    ] = None,
+    model: Models = None,
+    report: Diagnosis = None,
+    port: Port = None,
+    opened: Opened = None,
+    namespace: Namespace = "",
     domain: Domain = None,
 ) -> int:
     """Show a recording or a running graph on a page of this machine: top view, forces, models, time."""
     return _hand_over(
-        "view", what=what, mapping=mapping, models=model or [], report=report, port=port, opened=open_, domain=domain
+        "view",
+        what=what,
+        mapping=mapping,
+        models=model or [],
+        report=report,
+        port=port,
+        opened=opened,
+        namespace=namespace,
+        domain=domain,
     )
 
 
@@ -273,9 +286,7 @@ def bench(
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,
     seed: Seed = 0,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A smaller version that still measures, under a minute.")
-    ] = False,
+    quick: Quick = False,
     sets: Annotated[
         str | None,
         typer.Option(
@@ -307,9 +318,7 @@ def experiment(
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/experiment/NAME.")] = None,
     seed: Seed = 0,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A smaller version that still measures, under a minute.")
-    ] = False,
+    quick: Quick = False,
 ) -> int:
     """Repeat an experiment of the thesis; figure.png in the folder, the last line is the report as JSON."""
     return _hand_over("experiment", name=name, out=out, seed=seed, quick=quick)

@@ -47,6 +47,22 @@ Mapping = Annotated[
     Path | None, typer.Option("--map", help="Which topic or column plays which role in a foreign file.")
 ]
 Domain = Annotated[int | None, typer.Option(min=0, max=101, help="ROS_DOMAIN_ID; by default the environment's own.")]
+Models = Annotated[
+    list[Path] | None,
+    typer.Option(help="Learned model to draw: posterior_NAME.nc of fit or model_NAME.json of diagnose; repeatable."),
+]
+Diagnosis = Annotated[
+    Path | None, typer.Option(help="report.json of diagnose: what was left out, where, and the missing force.")
+]
+Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0: any. Default: 8765, or any.")]
+Opened = Annotated[
+    bool | None, typer.Option("--open/--no-open", help="Open a browser. Default: where there is a display.")
+]
+Quick = Annotated[bool, typer.Option("--quick", help="A smaller version that still measures, under a minute.")]
+Draws = Annotated[
+    int | None,
+    typer.Option(min=10, help="Posterior draws to keep from each of 4 chains, or a quarter of all. Default: 500."),
+]
 Namespace = Annotated[
     str, typer.Option(help="Of the robot, such as robot_1: several can share a domain. Default: none, the root.")
 ]

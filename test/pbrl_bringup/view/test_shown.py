@@ -86,8 +86,8 @@ def patch(frame: str) -> Found:
 
 
 def test_a_diagnosis_is_drawn_where_it_belongs() -> None:
-    found = Diagnosed({"table": patch("world"), "still": patch("body"), "gone": patch("world")},
-                      {"table": Lacking.model_validate(lacking())})  # fmt: skip
+    named = {"table": patch("world"), "still": patch("body"), "gone": patch("world"), "pillar": patch("joint")}
+    found = Diagnosed(named, {"table": Lacking.model_validate(lacking())})
     data = decorated(shown_of(recorded(), "bag"), Extras(), {}, found).data()
     strict(data)
     assert [region["object"] for region in data["regions"]] == [None, 1], "what stays, and what moves with the body"

@@ -87,6 +87,10 @@ def test_names_are_text_and_nothing_else(page: Browser) -> None:
     assert page.run("document.querySelector('.placetext').textContent").startswith(EVIL)
 
 
+def test_it_says_what_it_is_of(page: Browser) -> None:
+    assert page.run("document.querySelector('#state').textContent") == "12.0 s since 100 s, 3 objects, 1 gripper"
+
+
 def test_keys_move_the_time(page: Browser) -> None:
     assert clock(page) == 0.0
     for key, shift, expected in (

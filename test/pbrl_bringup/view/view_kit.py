@@ -45,9 +45,9 @@ def recorded(name: str = "table", seconds: float = 12.0) -> Recording:
 
 
 @contextmanager
-def serving(app: Starlette) -> Iterator[str]:
+def serving(app: Starlette, port: int = 0) -> Iterator[str]:
     """Serve an application in a thread; yield its address."""
-    with listening(0) as at:
+    with listening(port) as at:
         server = uvicorn.Server(uvicorn.Config(app, log_level="error", lifespan="off", timeout_graceful_shutdown=1))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [at]})
         thread.start()

@@ -1,5 +1,7 @@
 // One time for all that a part of a page shows: slider, play button and clock. All pages play with it.
 
+const TICK = 16; // [ms] between pictures while it plays
+
 // `show(t)` draws a time; `span()` gives first and last time [s]; `speed()` seconds of the recording a second.
 function makePlayer({ slider, button, clock, span, show, speed = () => 1, stopped = () => {} }) {
   let time = span()[0], timer = null, stamp = 0;
@@ -15,17 +17,16 @@ function makePlayer({ slider, button, clock, span, show, speed = () => 1, stoppe
 
   function stop() {
     if (timer === null) return;
-    cancelAnimationFrame(timer);
+    clearInterval(timer);
     timer = null;
     button.textContent = "\u25b6";
     button.setAttribute("aria-label", "play");
     stopped();
   }
 
-  function frame(moment) {
-    const [, end] = span(), next = time + (Math.max(moment - stamp, 0) / 1000) * speed();
+  function tick() {
+    const moment = performance.now(), [, end] = span(), next = time + ((moment - stamp) / 1000) * speed();
     stamp = moment;
-    timer = requestAnimationFrame(frame);
     to(next);
     if (next >= end) stop();
   }
@@ -37,7 +38,7 @@ function makePlayer({ slider, button, clock, span, show, speed = () => 1, stoppe
     button.textContent = "\u2759\u2759";
     button.setAttribute("aria-label", "pause");
     stamp = performance.now();
-    timer = requestAnimationFrame(frame);
+    timer = setInterval(tick, TICK);
   }
 
   function jump(t) { stop(); to(t); }

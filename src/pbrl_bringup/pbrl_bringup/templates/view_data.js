@@ -11,14 +11,17 @@ function makeStreams(data) {
   async function ask(name, from, to, most) {
     if (waiting[name]) { waiting[name] = [from, to, most]; return false; }
     waiting[name] = [from, to, most];
-    let asked;
-    do {
-      asked = waiting[name];
-      const answer = await fetch(`detail?from=${asked[0]}&to=${asked[1]}&most=${asked[2]}`);
-      if (!answer.ok) throw new Error(`/detail: ${answer.status}`);
-      layers[name] = await answer.json();
-    } while (waiting[name] !== asked);
-    waiting[name] = null;
+    try {
+      let asked;
+      do {
+        asked = waiting[name];
+        const answer = await fetch(`detail?from=${asked[0]}&to=${asked[1]}&most=${asked[2]}`);
+        if (!answer.ok) throw new Error(`/detail: ${answer.status}`);
+        layers[name] = await answer.json();
+      } while (waiting[name] !== asked);
+    } finally {
+      waiting[name] = null;
+    }
     return true;
   }
 
@@ -63,16 +66,37 @@ function makeStreams(data) {
     return shown[kind][i] || layers.whole[kind][i];
   }
 
+  function grow(known, found, begin) {
+    if (!known) return;
+    if (!known.high && known.low) known.high = known.low.map((column) => [...column]);
+    const last = known.time.length ? known.time[known.time.length - 1] : -Infinity;
+    const first = found.time.findIndex((t) => t > last), old = known.time.length && known.time[0] < begin - 30 ? indexBefore(known.time, begin) : 0;
+    const columns = (each) => [each.time, ...(each.x ? [each.x, each.y, each.theta] : [...each.low, ...(each.high || each.low)])];
+    const there = columns(known), fresh = columns(found);
+    there.forEach((column, k) => {
+      if (first >= 0) column.push(...fresh[k].slice(first));
+      if (old) column.splice(0, old);
+    });
+    known.gap = found.time.length > 2 ? Math.max(known.gap, 0.5) : known.gap;
+  }
+
   return {
     pose, values, curve,
     whole: (kind, i) => layers.whole[kind][i],
     // Fetch what the cursor needs, if it is not there; resolves to whether there is something new to draw.
     near(t) {
+      if (data.live) return Promise.resolve(false); // what comes is complete
       const there = layers.near;
       const half = NEAR / 2, known = there && t - half >= there.from && t + half <= there.to;
       return known ? Promise.resolve(false) : ask("near", Math.max(t - NEAR, 0), t + NEAR, NEAR_SAMPLES);
     },
-    window: (from, to) => ask("window", from, to, WINDOW_CELLS),
-    drop() { layers.near = layers.window = null; },
+    window: (from, to) => (data.live ? Promise.resolve(false) : ask("window", from, to, WINDOW_CELLS)),
+    // Put what is new behind what is known; what is older than `begin` is forgotten.
+    append(update, begin) {
+      layers.whole.to = update.to;
+      for (const kind of ["objects", "grippers", "wrenches", "forces", "residuals"]) {
+        update[kind].forEach((found, i) => { if (found) grow(layers.whole[kind][i], found, begin); });
+      }
+    },
   };
 }

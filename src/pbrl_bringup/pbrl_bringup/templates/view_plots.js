@@ -2,10 +2,11 @@
 
 const CURVE = { left: 52, right: 12, top: 22, bottom: 6, height: 104, axis: 22 };
 const AXES = ["x", "y", "z"];
+const MOST_POINTS = 3000; // of one curve
 
 // `set(t)` moves the time of the page; `zoomed(from, to)` is told the interval that is shown from now on.
-function makePlots(parent, data, streams, { span, set, zoomed }) {
-  let shown = [...span()], time = 0, plots = [];
+function makePlots(parent, data, streams, { span, set, zoomed, kept }) {
+  let shown = kept || [...span()], time = 0, plots = [];
 
   const wanted = () => {
     const felt = data.grippers.map((gripper, i) => ({ kind: "wrenches", i, names: AXES, note: gripper.felt })).filter((each) => streams.whole("wrenches", each.i));
@@ -57,7 +58,7 @@ function makePlots(parent, data, streams, { span, set, zoomed }) {
     const found = streams.curve(what.kind, what.i, shown[0], shown[1]), x = X(box);
     const Y = plotAxes(svg, box, limits(found, what.columns), what.title, what.unit), bottom = box.height - box.bottom;
     const key = element(svg, "text", { x: width - box.right - 44, y: 13, "text-anchor": "end" });
-    what.names.forEach((name, k) => element(key, "tspan", { class: `key${k}`, dx: 8 }, name));
+    if (what.names.length > 1) what.names.forEach((name, k) => element(key, "tspan", { class: `key${k}`, dx: 8 }, name));
     if (what.note) element(svg, "title", {}, what.note);
     if (last) timeAxis(svg, x, shown[0], shown[1], bottom, Math.max(4, Math.floor(width / 90)));
     const inside = element(svg, "svg", { x: box.left, y: box.top - 3, width: width - box.left - box.right, height: bottom - box.top + 6,
@@ -74,6 +75,8 @@ function makePlots(parent, data, streams, { span, set, zoomed }) {
     const low = found.low[column], high = (found.high || found.low)[column], { time } = found;
     const from = indexBefore(time, shown[0]), to = Math.min(indexBefore(time, shown[1]) + 1, time.length - 1);
     const limit = Math.max(found.gap, (3 * (time[time.length - 1] - time[0])) / Math.max(time.length - 1, 1));
+    const many = Math.ceil((to - from) / MOST_POINTS);
+    if (many > 1) return drawBand(parent, gathered(found, column, from, to, many), 0, x, Y, k);
     let line = "", band = "", part = [];
     const close = () => {
       if (found.high && part.length) {
@@ -92,6 +95,18 @@ function makePlots(parent, data, streams, { span, set, zoomed }) {
     element(parent, "path", { class: `line${k}`, d: line });
   }
 
+  // One column with every so many samples as one, from the least to the greatest of them.
+  function gathered({ time, low, high, gap }, column, from, to, many) {
+    const out = { time: [], low: [[]], high: [[]], gap };
+    for (let j = from; j <= to; j += many) {
+      const end = Math.min(j + many, to + 1), lows = low[column].slice(j, end), highs = (high || low)[column].slice(j, end);
+      out.time.push(time[Math.floor((j + end - 1) / 2)]);
+      out.low[0].push(lows.includes(null) ? null : Math.min(...lows));
+      out.high[0].push(highs.includes(null) ? null : Math.max(...highs));
+    }
+    return out;
+  }
+
   // A lane a gripper: bars while it holds something, with the name of what it holds.
   function drawHeld(width) {
     const box = { left: CURVE.left, right: CURVE.right, width }, lane = 18, x = X(box);
@@ -104,7 +119,8 @@ function makePlots(parent, data, streams, { span, set, zoomed }) {
     data.grippers.forEach((gripper, i) => element(svg, "text", { x: box.left - 7, y: lane * i + 13, "text-anchor": "end" }, gripper.name));
     for (const grasp of data.grasps) {
       const row = data.grippers.findIndex((each) => each.name === grasp.gripper), object = data.objects.findIndex((each) => each.name === grasp.object);
-      const left = Math.max(x(grasp.start), box.left), wide = x(grasp.end) - left;
+      const end = grasp.open ? Math.max(grasp.end, data.end) : grasp.end;
+      const left = Math.max(x(grasp.start), box.left), wide = x(end) - left;
       if (wide <= 0) continue;
       element(inside, "rect", { class: `grasp ${colour(Math.max(object, 0))}`, x: left, y: lane * row + 1, width: wide, height: lane - 3, rx: 3 });
       if (wide > 30) element(inside, "text", { class: "grasptext", x: left + 5, y: lane * row + 13 }, grasp.object.slice(0, Math.floor(wide / 6.4)));
@@ -158,6 +174,13 @@ function makePlots(parent, data, streams, { span, set, zoomed }) {
     for (const plot of plots) plot(t);
   }
 
+  // New data: the interval keeps its length and reaches to the end.
+  function follow(end) {
+    const long = shown[1] - shown[0], from = Math.max(end - long, span()[0]);
+    shown = [from, from + long];
+    draw();
+  }
+
   draw();
-  return { draw, move, zoom, whole: () => show(...span()), shown: () => shown };
+  return { draw, move, zoom, follow, whole: () => show(...span()), shown: () => shown };
 }

@@ -2,11 +2,13 @@
 
 const PALETTE = 6; // colours of objects in view.css
 const STRONGEST = 90; // [px] arrow of the largest force
+const WEAK = 10; // [N] forces that are all smaller are not drawn as if they were large
 const MILLI = { map: ([x, y]) => [1000 * x, 1000 * y] }; // posteriors are drawn in millimetres of the body's frame
 
 function colour(i) { return `c${i % PALETTE}`; }
 
-function makeScene(svg, data, streams, forces) {
+// `forces(i)` is the largest force of a gripper [N]; `kept` the view of a picture that this one takes the place of.
+function makeScene(svg, data, streams, forces, kept) {
   svg.replaceChildren();
   const grid = element(svg, "path", { class: "grid" }), floor = element(svg, "g", { class: "metres" });
   const still = element(floor, "g"), regions = element(floor, "g"), moving = element(floor, "g"), over = element(svg, "g");
@@ -79,7 +81,7 @@ function makeScene(svg, data, streams, forces) {
     return { dot, ...arrow("force"), text: element(over, "text", { class: "forcetext halo" }) };
   }
 
-  const strongest = Math.max(1, ...data.grippers.map((_, i) => forces(i)));
+  let strongest = Math.max(WEAK, ...data.grippers.map((_, i) => forces(i)));
 
   function lookAt(next) {
     view = next;
@@ -87,7 +89,7 @@ function makeScene(svg, data, streams, forces) {
     const [x, y] = view.map([0, 0]);
     floor.setAttribute("transform", `matrix(${view.scale} 0 0 ${-view.scale} ${x} ${y})`);
     svg.style.setProperty("--px", String(1000 / view.scale)); // a pixel in the millimetres of posteriors
-    grid.setAttribute("d", gridLines(view, 8));
+    grid.setAttribute("d", gridLines(view, 14));
     if (scale) scale.remove();
     scale = element(svg, "g");
     scaleBar(scale, view);
@@ -171,7 +173,9 @@ function makeScene(svg, data, streams, forces) {
     const [x, y] = view.map([pose.x, pose.y]);
     dot.setAttribute("cx", x.toFixed(1));
     dot.setAttribute("cy", y.toFixed(1));
-    const [fx, fy] = force || [0, 0], size = Math.hypot(fx, fy), k = STRONGEST / strongest;
+    const [fx, fy] = force || [0, 0], size = Math.hypot(fx, fy);
+    strongest = Math.max(strongest, size); // a running graph may push harder than ever before
+    const k = STRONGEST / strongest;
     // The arrow's point touches the gripper: a push is read as coming from outside.
     const tail = [x - fx * k, y + fy * k];
     if (!setArrow(shaft, head, tail, [x, y])) return;
@@ -187,14 +191,18 @@ function makeScene(svg, data, streams, forces) {
     setArrow(shaft, head, [x, y], [x + lacks[0] * k, y - lacks[1] * k]);
   }
 
-  dragging(svg, move);
+  if (kept) { lookAt(kept); touched = true; } else fit();
+  return { update, fit, zoom, move, resize, view: () => view, kept: () => (touched ? view : null) };
+}
+
+// The hand in the picture: dragging moves it, the wheel enlarges it about the pointer; `scene()` is the one drawn now.
+function handleScene(svg, scene) {
+  dragging(svg, (dx, dy) => scene().move(dx, dy));
   svg.addEventListener("wheel", (event) => {
     event.preventDefault();
     const box = svg.getBoundingClientRect();
-    zoom(Math.exp(-event.deltaY * 0.0015), [event.clientX - box.left, event.clientY - box.top]);
+    scene().zoom(Math.exp(-event.deltaY * 0.0015), [event.clientX - box.left, event.clientY - box.top]);
   }, { passive: false });
-  fit();
-  return { update, fit, zoom, move, resize, view: () => view };
 }
 
 // Calls `moved(dx, dy)` [px] while a node is dragged.

@@ -20,7 +20,9 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
 
 WORLD = ("world", "floor")
-"""Frames of places that stay where they are; all others move with the object."""
+"""Frames of places that stay where they are."""
+ON_THE_BODY = ("base", "body")
+"""Frames of places that move with the object, besides its own name; those in other frames are not drawn."""
 
 
 class _Part(BaseModel):
@@ -118,7 +120,7 @@ def regions_of(report: Mapping[str, Found], objects: list[str], origin: float) -
         for name, found in report.items()
         if name in objects
         for named in found.effects
-        if named.where is not None and named.where.shape
+        if named.where is not None and named.where.shape and named.where.frame in (*WORLD, *ON_THE_BODY, name)
     ]
 
 

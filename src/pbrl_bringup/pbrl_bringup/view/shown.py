@@ -48,14 +48,14 @@ class Shown:
     forces: Sequence[BandTrack | None]
     residuals: Sequence[BandTrack] = field(default_factory=tuple)
 
-    def data(self) -> dict[str, Any]:
-        """Return what the page asks for first: all that is still, and the whole of the streams, coarsely."""
+    def data(self, most: int = FIRST) -> dict[str, Any]:
+        """Return what the page asks for first: all that is still, and the streams with at most `most` samples."""
         return {
             "title": self.title,
             "origin": self.origin,
             "end": round(self.end, 4),
             **self.still,
-            "streams": self.detail(0.0, self.end, FIRST),
+            "streams": self.detail(0.0, self.end, most),
         }
 
     def detail(self, start: float, end: float, most: int) -> dict[str, Any]:
@@ -75,11 +75,17 @@ class Shown:
         }
 
 
-def shown_of(recording: Recording, title: str) -> Shown:
-    """Return what can be drawn of a recording, whatever of it is missing."""
+def shown_of(recording: Recording, title: str, span: tuple[float, float] | None = None) -> Shown:
+    """Return what can be drawn of a recording, whatever of it is missing.
+
+    Args:
+        recording: whole or in part.
+        title: names it.
+        span: begin and end of the page's time on the recording's clock [s]; None: of the recording.
+    """
     objects = sorted(set(recording.bodies) | set(recording.object_poses))
     grippers = sorted(set(recording.wrenches) | set(recording.gripper_poses) | {g.gripper for g in recording.grasps})
-    origin, end = _span(recording)
+    origin, end = _span(recording) if span is None else span
     poses, felt = recording.object_poses, recording.wrenches
     still = {
         "notes": list(recording.notes),
@@ -92,6 +98,7 @@ def shown_of(recording: Recording, title: str) -> Shown:
                 "object": grasp.object,
                 "start": grasp.start - origin,
                 "end": grasp.end - origin,
+                "open": grasp.end >= end,
                 "contact": listed(grasp.contact, METRES),
             }
             for grasp in recording.grasps
