@@ -94,5 +94,5 @@ class PayloadChange(Effect):
         self._box = None
 
     def strength(self) -> float:
-        """Give by how much the mass has changed [kg]."""
-        return self._settings.mass if self._changed else 0.0
+        """Give what lies on the body beyond the body that was told [kg]: before it is taken off, after it is put on."""
+        return self._settings.mass if self._box is not None else 0.0

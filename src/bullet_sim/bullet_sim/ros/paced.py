@@ -210,6 +210,7 @@ class PacedSimulator(Node):
         """End Bullet with the node."""
         self._session.close()
         self._spinner.remove_node(self)
+        self._spinner.shutdown()  # left to the collector, it may outlive the context and complain
         super().destroy_node()
 
 

@@ -90,8 +90,12 @@ class HandNode(Node):
         """Push when asked, until it is told to stop."""
         spinner = SingleThreadedExecutor()
         spinner.add_node(self)
-        while not self._stop.is_set() and self.context.ok():
-            spinner.spin_once(timeout_sec=0.1)
+        try:
+            while not self._stop.is_set() and self.context.ok():
+                spinner.spin_once(timeout_sec=0.1)
+        finally:
+            spinner.remove_node(self)
+            spinner.shutdown()
 
     def destroy_node(self) -> None:
         """End Bullet with the node."""

@@ -103,7 +103,7 @@ def _drawn(
         point = (at[0], at[1]) if at else None
         cord = columns.index(effect.cord) if effect.cord else None
         draws = with_pulls(rng, draws, (x, y), point, cord, track, lacks)
-    if effect.second:
+    if effect.second and "wheel_x" in columns:
         draws = with_splits(rng, draws, columns, scene_of(track, base.row).size)
     if effect.pins is not None:
         draws = with_pins(rng, draws, (columns.index(effect.pins[0]), columns.index(effect.pins[1])), track)
