@@ -24,7 +24,7 @@ from pbrl_mismatch.search.path.ground import traced
 from pbrl_mismatch.search.path.pins import may_be_pinned
 from pbrl_mismatch.search.path.starts import BENT
 from pbrl_mismatch.search.predictive import predictive_test
-from pbrl_mismatch.search.weigh import Weighed, veto, weigh
+from pbrl_mismatch.search.weigh import Weighed, veto, weigh, worth_of_another
 
 Array = NDArray[np.float64]
 
@@ -44,6 +44,9 @@ LED = 100.0
 """Kinds of baseline that are worse than the best by more [nat] are not led: no other top would do."""
 FREEDOM = 1.0
 """An effect that says nothing is less likely than the baseline by about so much at least, for its freedom [nat]."""
+WORTH_A_SET = 3.0
+"""Where the likeliest explains all that the test against any wrench sees, one effect more is looked into where along
+the path it is worth by this more than its prior costs [nat]."""
 WORTH_A_KIND = 3.0
 """A kind of baseline with more parameters is worth a search of its own where it is better by this [nat]."""
 
@@ -105,10 +108,17 @@ def explain(
     odds = min(_log_odds(singles), _log_odds(weighed))
     for depth in range(1, options.most_together):
         deepest = _grounds_of_sets([each.fitted for each in weighed if len(each.effects) == depth], track)
-        if len(weighed[0].effects) < depth or not _lacks(weighed[0].fitted, grip, options):
+        if len(weighed[0].effects) < depth:
             break
+        least = -math.inf
+        if not _lacks(weighed[0].fitted, grip, options):
+            if len(stages.fitted) < len(options.windows):
+                break  # What is weighed are shorter windows than the path's.
+            least = worth_of_another(weighed) + WORTH_A_SET
         fewer = options.model_copy(update=FEWER)
-        more = _tried(seeds[depth], track, deepest, stages, grip, fewer)
+        more = _tried(seeds[depth], track, deepest, stages, grip, fewer, least)
+        if not more:
+            break
         likely = tuple(each for each in weigh(bases, [*tried, *more], options) if len(each.effects) != depth)
         tried += [beside_motion(each, grip) for each in _polished(likely, more, stages, options, POLISHED_OF_SETS)]
         weighed = weigh(bases, tried, options)
@@ -233,9 +243,15 @@ def _tried(
     stages: Stages,
     grip: GripEvidence | None,
     options: DiagnoseOptions,
+    least: float = -math.inf,
 ) -> list[Fitted]:
-    """Try every effect on every ground; what the grippers' poses say comes in beside the motion."""
-    found = [beside_motion(each, grip) for each in search_library(seed, track, grounds, stages, options)]
+    """Try every effect on every ground; what the grippers' poses say comes in beside the motion.
+
+    Nothing is returned where no effect's path is likelier than its ground's by `least` [nat].
+    """
+    found = [beside_motion(each, grip) for each in search_library(seed, track, grounds, stages, options, least)]
+    if not found and least > -math.inf:
+        return []
     if grip is not None and GRASP_COMPLIANCE in options.effects:
         found += [gives_way(each, grip) for each in grounds if GRASP_COMPLIANCE not in each.hypothesis.effects]
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -42,7 +43,12 @@ LEADING = 3
 
 
 def search_library(
-    seed: np.random.SeedSequence, track: Track, bases: Sequence[Fitted], stages: Stages, options: DiagnoseOptions
+    seed: np.random.SeedSequence,
+    track: Track,
+    bases: Sequence[Fitted],
+    stages: Stages,
+    options: DiagnoseOptions,
+    least: float = -math.inf,
 ) -> list[Fitted]:
     """Fit every effect on top of every base, in threads; the bytes do not depend on how many.
 
@@ -55,6 +61,10 @@ def search_library(
         bases: fitted baselines, or hypotheses that already have effects.
         stages: windows.
         options: settings.
+        least: where no effect is likelier along the path than what it is laid on by more [nat], none is simulated.
+
+    Returns:
+        What was simulated to the end; nothing, where nothing is worth it.
     """
     longest = cut_windows(track, max(options.windows))
     grounds = [ground_of(each.hypothesis, each.peak.coordinates[0], longest, options.sensor_floor) for each in bases]
@@ -74,6 +84,11 @@ def search_library(
 
     with ThreadPoolExecutor(options.workers) as pool:
         begun = list(pool.map(begin, range(len(jobs))))
+        if least > -math.inf:
+            before_it = {id(ground): ground.evidence for ground in grounds}
+            gained = [float(each.evidence.max()) - before_it[id(job[3])] for each, job in zip(begun, jobs, strict=True)]
+            if max(gained, default=-math.inf) < least:
+                return []
         stands_in = any(_path_above_simulation(base) > UNTOLD for base in bases)
         most = len(EFFECTS) if stands_in else options.shortlist
         chosen = _survivors([each.hypothesis for each in begun], begun, most, CLOSE[0])

@@ -75,6 +75,13 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
     return _ordered(entries)
 
 
+def worth_of_another(weighed: Sequence[Weighed]) -> float:
+    """Return how much likelier one effect more must make the likeliest hypothesis to be likelier than it [nat]."""
+    singles = max(sum(len(each.effects) == 1 for each in weighed), 1)
+    none = max(each.fitted.evidence for each in weighed if not each.effects)
+    return math.log(singles) + DISCREPANCY * max(weighed[0].fitted.evidence - none, 0.0)
+
+
 def veto(weighed: Sequence[Weighed], baseline: Fitted, judge: Callable[[Fitted], Fitted]) -> tuple[Weighed, ...]:
     """Return hypotheses with the likeliest held against what was held out of their fit.
 

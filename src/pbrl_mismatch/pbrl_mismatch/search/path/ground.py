@@ -76,6 +76,11 @@ class Ground:
         return self.along(FINE)
 
     @cached_property
+    def evidence(self) -> float:
+        """Return its log evidence there [nat], which effects on it are held against."""
+        return float(climb_along(self.climbed, self.hypothesis, self.coordinates[None], ITERATIONS).evidence[0])
+
+    @cached_property
     def first(self) -> Look:
         """Return what draws are compared with."""
         return self._look(self.along(COARSE))

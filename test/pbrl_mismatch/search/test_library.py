@@ -1,0 +1,48 @@
+"""The library on a base: what is worth simulating, and what the path alone rules out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch import DiagnoseOptions, track_of
+from pbrl_mismatch.search.fitted import Fitted, cut_stages, fit_from
+from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
+from pbrl_mismatch.search.library import search_library
+from pbrl_mismatch.search.weigh import DISCREPANCY, weigh, worth_of_another
+
+FEW = ("viscous_drag", "floor_slope", "wrench_bias")
+OPTIONS = DiagnoseOptions(
+    draws=60, shortlist=4, survivors=(2,), without=tuple(name for name in DiagnoseOptions().effects if name not in FEW)
+)
+WORTH = 5.0
+"""What an effect has to be worth along the path [nat]."""
+
+
+def base_of(recording: Recording) -> tuple[Any, Any, Fitted]:
+    """Return the track of a table, its windows, and a body without laws fitted to them."""
+    track = track_of(recording, "table")
+    stages = cut_stages(track, OPTIONS)
+    free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.02), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    return track, stages, fit_from(free, stages, free.mean[None], OPTIONS)
+
+
+@pytest.mark.parametrize(("concealed", "left"), [("clean", 0), ("viscous_drag", 1)])
+def test_nothing_is_simulated_where_the_path_has_no_use_for_it(
+    concealed_recording: Callable[..., Recording], concealed: str, left: int
+) -> None:
+    track, stages, base = base_of(concealed_recording(concealed, 1))
+    found = search_library(np.random.SeedSequence(0), track, [base], stages, OPTIONS, WORTH)
+    assert bool(found) == bool(left)
+    if found:
+        best = max(found, key=lambda each: each.evidence)
+        assert best.hypothesis.effects == ("viscous_drag",)
+        again = search_library(np.random.SeedSequence(1), track, [best], stages, OPTIONS, WORTH)
+        assert not again, "what explains all leaves nothing that is worth another"
+        asks = worth_of_another(weigh([base], found, OPTIONS))
+        singles = len({each.hypothesis.effects for each in found})
+        assert asks == pytest.approx(np.log(singles) + DISCREPANCY * (best.evidence - base.evidence))
