@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Collection
 from functools import cache
 from typing import Any
 
@@ -27,10 +28,11 @@ def _pinocchio() -> Any:
 
 
 class Arm:
-    """The joints that carry a tip.
+    """The joints that carry a tip, and what else they carry.
 
     Attributes:
-        chain: names of all joints from the root of the URDF to the tip, in that order.
+        chain: names of all joints whose positions matter: from the root of the URDF to the tip, in that order, then
+            those of whatever else hangs on a measured joint and is told, as the other arm does on a torso.
 
     Args:
         urdf: text of the robot's description.
@@ -38,13 +40,20 @@ class Arm:
         tip: frame or link at which the wrench is wanted.
         gravity: (3,) in the axes of the URDF's root [m/s^2].
         where: what to call the description in errors.
+        told: joints whose positions are told; what hangs on a measured joint by others stands as the URDF draws it.
 
     Raises:
         BagError: the text is no URDF, or joints and tip are not in it, or not one chain.
     """
 
     def __init__(
-        self, urdf: str, joints: tuple[str, ...], tip: str, gravity: tuple[float, float, float], where: str
+        self,
+        urdf: str,
+        joints: tuple[str, ...],
+        tip: str,
+        gravity: tuple[float, float, float],
+        where: str,
+        told: Collection[str] = (),
     ) -> None:
         self._pin = pin = _pinocchio()
         try:
@@ -65,6 +74,10 @@ class Arm:
                     f"{where}: joints: expected joints that carry {tip!r}, got {name!r}; "
                     f"{nearest(name, list(self.chain))}"
                 )
+        for k in range(1, whole.njoints):
+            above = {str(whole.names[each]) for each in whole.supports[k]}
+            if whole.names[k] in told and whole.names[k] not in self.chain and above & set(joints):
+                self.chain = (*self.chain, str(whole.names[k]))
         others = [whole.getJointId(name) for name in whole.names[1:] if name not in self.chain]
         self._model = pin.buildReducedModel(whole, others, pin.neutral(whole)) if others else whole
         self._model.gravity.linear = np.array(gravity, dtype=float)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,15 +21,17 @@ BEFORE, AFTER = 0.2, 0.5
 BLOCK, FEWEST_BLOCKS = 0.5, 6
 """Noise is judged over means of so long [s], of which there have to be so many: white noise is not what misleads a fit,
 friction in the gears and a wrong weight are."""
+BOTH = 2.0
+"""Factor on the variance: what was read before the grip closed is taken out, and was off as well."""
 LEAST, LEAST_SHARE = 0.01, 0.01
 """An effort is never taken to be better than this [N m], nor than this share of the largest: no gravity model is."""
 SMOOTHED = 0.2
 """Speeds and accelerations are taken over so long [s]."""
 
 
-def arm_of(source: EffortSource, urdf: str, where: str) -> Arm:
-    """Return the arm that a source is about; raises BagError as `Arm` does."""
-    return Arm(urdf, source.joints, source.tip, source.gravity, where)
+def arm_of(source: EffortSource, urdf: str, where: str, told: Collection[str] = ()) -> Arm:
+    """Return the arm that a source is about; arguments and errors as of `Arm`."""
+    return Arm(urdf, source.joints, source.tip, source.gravity, where, told)
 
 
 def tip_torques(samples: JointSamples, arm: Arm) -> tuple[Array, Array]:
@@ -63,14 +65,14 @@ def wrench_from_efforts(
             too short a time to judge the noise by.
     """
     source, label = samples.source, samples.label
-    torques, jacobians = tip_torques(samples, arm_of(source, urdf, where))
+    torques, jacobians = tip_torques(samples, arm_of(source, urdf, where, samples.positions))
     noise = _noise(samples, torques, grasps)
     wrench, covariance = tip_wrenches(jacobians, torques, noise, point=source.ignore_torque)
     held = np.zeros(len(samples), dtype=bool)
     for grasp in grasps:
         held |= (samples.time >= grasp.start) & (samples.time <= grasp.end)
     matters = covariance[held] if held.any() else covariance
-    typical = matters.mean(axis=0)
+    typical = BOTH * matters.mean(axis=0)
     force, torque = np.sqrt(np.trace(typical[:3, :3]) / 3.0), np.sqrt(np.trace(typical[3:, 3:]) / 3.0)
     off = f"{force:.2g} N" + ("" if source.ignore_torque else f" and {torque:.2g} N m")
     how = "as told" if source.noise is not None else "as efforts were off while the hand was empty"

@@ -128,7 +128,7 @@ def _felt(candidate: JointCandidate, source: EffortSource, text: str) -> Array |
     try:
         for message in candidate.messages:
             samples.add(message, None)
-        torques, jacobians = tip_torques(samples, arm_of(source, text, candidate.topic))
+        torques, jacobians = tip_torques(samples, arm_of(source, text, candidate.topic, samples.positions))
     except BagError:  # no Pinocchio here, or a number that is not one: reading the bag by the mapping will say so
         return None
     wrenches, _ = tip_wrenches(jacobians, torques, np.ones(len(source.joints)))
