@@ -190,7 +190,7 @@ def target_of(
         geometry: footprint, nominal mass, pose in the scene.
         likelihood: of the recorded poses.
         options: class, priors and left-out force.
-        error: of the wrenches themselves [N], see `wrench_error`; it adds to the left-out force.
+        error: of the wrenches themselves in one window [N]; it adds to the left-out force.
 
     Raises:
         ModelError: an option does not fit the footprint.
@@ -281,7 +281,8 @@ def _observed(
     parts = split(motions, options)
     body = body_of(recording.bodies[name], motions[0].oriented)
     likelihood = WindowedLikelihood(body, parts.fitted, with_drag=options.likelihood == "windowed")
-    error = wrench_error(recording, motions, body)
+    # Windows are fitted with a left-out force each, as if the next had another; what joints are off is alike in all.
+    error = wrench_error(recording, motions, body) * math.sqrt(len(parts.fitted))
     return motions, parts, target_of(recording.bodies[name], likelihood, options, error)
 
 
