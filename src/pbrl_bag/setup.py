@@ -26,6 +26,7 @@ setup(
         "scipy>=1.12",
         "zstandard>=0.22",
     ],
+    extras_require={"efforts": ["pin>=2.7"]},  # a wrench out of joint efforts
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from numpy.typing import NDArray
 
 from bullet_sim.client import BulletClient, Pose, cross, yaw_quaternion
+from bullet_sim.description import installed_description
 from bullet_sim.quiet import bullet
 from krang_sim.errors import KrangError
 from krang_sim.postures import Posture
@@ -64,21 +64,8 @@ class Limits:
 
 
 def description_path() -> Path:
-    """Find Krang's URDF in the installed workspace.
-
-    Raises:
-        KrangError: the package of robot descriptions is not installed.
-    """
-    try:
-        share = Path(get_package_share_directory("pbrl_description"))
-    except PackageNotFoundError:
-        raise KrangError(
-            "package pbrl_description: expected in the ament index, not found; source the workspace"
-        ) from None
-    path = share / "krang" / "krang.urdf"
-    if not path.is_file():
-        raise KrangError(f"{path}: expected Krang's URDF, there is no such file; build the workspace again")
-    return path
+    """Find Krang's URDF in the installed workspace; raise SimError where it is not."""
+    return installed_description("krang")
 
 
 class Krang:

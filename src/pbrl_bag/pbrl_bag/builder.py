@@ -15,7 +15,8 @@ from pbrl_bag.decoding import poses_in, wrench_in
 from pbrl_bag.errors import BagError
 from pbrl_bag.geometry import bodies_of_mapping, bodies_of_scene, corners
 from pbrl_bag.grasps import GraspChange, change_in, grasps_from_changes, grasps_from_mapping
-from pbrl_bag.mapping import FramePose, Mapping, PoseSource, WrenchSource
+from pbrl_bag.joint_efforts import JointSamples, wrench_from_efforts
+from pbrl_bag.mapping import EffortSource, FramePose, Mapping, PoseSource, WrenchSource
 from pbrl_bag.roles import CONTRACT, Kind, Role, roles_of, topic_of
 from pbrl_bag.samples import Samples
 from pbrl_bag.streams import Limits, pose_stream, read_only, wrench_stream
@@ -39,6 +40,8 @@ class RecordingBuilder:
         self.notes: list[str] = []
         self._topics: dict[str, tuple[Role, ...]] = {}
         self._samples: dict[tuple[Kind, str], Samples] = {}
+        self._joints: dict[str, JointSamples] = {}
+        self._descriptions: dict[str, str] = {}
         self._changes: list[GraspChange] = []
         self._scene: tuple[dict[str, BodyGeometry], Array] | None = None
 
@@ -66,6 +69,10 @@ class RecordingBuilder:
                 self._changes.append(change_in(topic, stamp_message))
             elif role.kind == "scene":
                 self._add_scene(topic, stamp_message)
+            elif role.kind == "description":
+                self._descriptions[topic] = str(getattr(stamp_message, "data", ""))
+            elif isinstance(role.source, EffortSource):
+                self._joints.setdefault(role.name, JointSamples(topic, role.source)).add(stamp_message, heard)
             elif isinstance(role.source, WrenchSource):
                 self._add_wrench(topic, role, role.source, stamp_message, heard)
             elif isinstance(role.source, PoseSource):
@@ -118,11 +125,14 @@ class RecordingBuilder:
         grippers = self._poses("gripper_poses", notes)
         wrenches = self._wrenches(notes)
         streams: list[PoseStream | WrenchStream] = [*objects.values(), *grippers.values(), *wrenches.values()]
-        if not complete:
-            notes += self._left_out(objects, wrenches)
-        start, end = self._span(path, streams, complete=complete)
+        times = [stream.time for stream in streams]
+        times += [samples.time for samples in self._joints.values() if len(samples)]
+        start, end = self._span(path, times, complete=complete)
         bodies, room = self._geometry(path, objects, complete=complete)
         grasps = self._grasps(path, start, end, complete=complete)
+        wrenches |= self._efforts(path, grasps, notes)
+        if not complete:
+            notes += self._left_out(objects, wrenches)
         for name in sorted(set(objects) - set(bodies)):
             notes.append(f"body {name!r} is seen but has no geometry: it cannot be learned about")
         recording = Recording(path, bodies, objects, grippers, wrenches, grasps, room, tuple(notes))
@@ -133,7 +143,8 @@ class RecordingBuilder:
     def _lags(self) -> dict[str, Array]:
         """Return when messages were heard less their stamps [s], by topic; wrenches, which are most, come first."""
         streams = sorted(self._samples.items(), key=lambda each: (each[0][0] != "wrenches", each[0]))
-        return {samples.label: np.concatenate([np.empty(0), *samples.lags]) for _, samples in streams}
+        both: list[Samples | JointSamples] = [*self._joints.values(), *(samples for _, samples in streams)]
+        return {samples.label: np.concatenate([np.empty(0), *samples.lags]) for samples in both}
 
     def _left_out(self, objects: dict[str, PoseStream], wrenches: dict[str, WrenchStream]) -> list[str]:
         """Say which kinds of what a recording is made of are missing."""
@@ -220,15 +231,36 @@ class RecordingBuilder:
             streams[name] = wrench_stream(samples.label, rows[:, 0], force, torque, source.exerted_on, axes, notes)
         return streams
 
-    def _span(self, path: Path, streams: Sequence[PoseStream | WrenchStream], *, complete: bool) -> tuple[float, float]:
+    def _efforts(self, path: Path, grasps: Sequence[Grasp], notes: list[str]) -> dict[str, WrenchStream]:
+        """Return the wrenches that joint efforts stand in for, by gripper."""
+        streams = {}
+        for side, samples in sorted(self._joints.items()):
+            topic = samples.source.description
+            if not len(samples):
+                raise BagError(
+                    f"{path}: {samples.label}: expected joints {', '.join(samples.source.joints)}, got none of them; "
+                    f"it has {_listing(sorted(samples.positions))}"
+                )
+            if topic is not None and topic not in self._descriptions:
+                raise BagError(
+                    f"{path}: joint_efforts.{side}: description: expected topic {topic!r}, got no message of it; "
+                    "say `urdf: FILE` in its place"
+                )
+            text = self._descriptions[topic] if topic is not None else samples.source.urdf_text()
+            where = topic or str(samples.source.urdf)
+            own = [grasp for grasp in grasps if grasp.gripper == side]
+            streams[side] = wrench_from_efforts(samples, text, own, notes, where)
+        return streams
+
+    def _span(self, path: Path, times: Sequence[Array], *, complete: bool) -> tuple[float, float]:
         """Return times of the first and last sample [s]."""
-        if not streams and not complete and (self._scene or self.mapping.bodies):
+        if not times and not complete and (self._scene or self.mapping.bodies):
             return (self._changes[0].time, self._changes[-1].time) if self._changes else (0.0, 0.0)
-        if not streams:
+        if not times:
             raise self._missing(path, "object_poses", next(iter(self.mapping.object_poses), "<object>"))
         return (
-            min(float(stream.time[0]) for stream in streams),
-            max([float(stream.time[-1]) for stream in streams] + [change.time for change in self._changes[-1:]]),
+            min(float(time[0]) for time in times),
+            max([float(time[-1]) for time in times] + [change.time for change in self._changes[-1:]]),
         )
 
     def _geometry(

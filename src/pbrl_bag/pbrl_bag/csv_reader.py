@@ -99,6 +99,8 @@ def read_csv(path: Path, mapping: Mapping) -> Recording:
         raise BagError(f"{path}: expected `time` in the mapping (column and unit), got none: a CSV file needs it")
     table = Table(path, mapping.delimiter)
     time = _time(table, mapping.time)
+    if mapping.joint_efforts:
+        raise BagError(f"{path}: joint_efforts: expected a bag, got a CSV file; give forces under `wrenches`")
     builder = RecordingBuilder(mapping)
     for name, pose in mapping.object_poses.items():
         _add_pose(builder, table, time, "object_poses", name, pose)

@@ -150,7 +150,7 @@ def _cut_wrenches(stream: WrenchStream, start: float, end: float) -> WrenchStrea
     """Return the part of a wrench stream within an interval, one sample more at either end."""
     part = clip(stream.time, start, end, margin=1)
     time, force, torque = (read_only(values[part]) for values in (stream.time, stream.force, stream.torque))
-    return WrenchStream(time, force, torque, stream.exerted_on, stream.frame)
+    return WrenchStream(time, force, torque, stream.exerted_on, stream.frame, stream.covariance)
 
 
 def _empty(recording: Recording, name: str, hold: list[Grasp]) -> BagError:

@@ -1,7 +1,7 @@
 """Mapping files: which topic or column of a foreign recording plays which role.
 
-A mapping is YAML. It names the source of each role (`object_poses`, `gripper_poses`, `wrenches`,
-`grasps`), the frames and units they come in, and the geometry of the bodies; it serves bags (by
+A mapping is YAML. It names the source of each role (`object_poses`, `gripper_poses`, `wrenches`
+or `joint_efforts`, `grasps`), the frames and units they come in, and the geometry of the bodies; it serves bags (by
 `topic`) and CSV files (by column) alike. See config/mappings/ for commented examples.
 """
 
@@ -110,6 +110,50 @@ class WrenchSource(_Strict):
         return self
 
 
+class EffortSource(_Strict):
+    """What a gripper feels by the efforts of its arm's joints, on a topic of sensor_msgs/JointState.
+
+    Poorer than a wrist sensor: friction in the gears is in it, and where the arm is stretched nothing is felt along it.
+    `tip` is the link whose pose `gripper_poses` tells; the wrench is at its origin, in its axes, and raw as a
+    sensor's: what it shows before a grip closes is taken out.
+    """
+
+    topic: str
+    joints: tuple[str, ...] = Field(min_length=1)  # whose efforts are measured, on the way from the root to the tip
+    tip: str
+    urdf: Path | None = None  # file; relative to the mapping's folder
+    description: str | None = None  # in its place: the topic of the bag that has it, std_msgs/String
+    efforts: Literal["total", "external"] = "total"  # external: the driver has taken gravity and motion out
+    sign: Literal[-1, 1] = 1  # total: torque of the motor on the joint; external: of the world on it
+    noise: Positive | tuple[Positive, ...] | None = None  # [N m] how far off an effort is; default: as judged
+    gravity: Vector3 = (0.0, 0.0, -9.81)  # [m/s^2] in the axes of the URDF's root
+    inertia: bool = False  # also take out what the arm's own motion takes
+    ignore_torque: bool = False  # the hand exerts a force at a point and no torque
+    clock_offset: float = 0.0  # [s] added to its times
+
+    @model_validator(mode="after")
+    def _one_description(self) -> EffortSource:
+        if (self.urdf is None) == (self.description is None):
+            raise ValueError("expected either `urdf` (a file) or `description` (a topic), got both or neither")
+        if len(set(self.joints)) != len(self.joints):
+            raise ValueError(f"joints: expected each once, got {', '.join(self.joints)}")
+        if isinstance(self.noise, tuple) and len(self.noise) != len(self.joints):
+            raise ValueError(f"noise: expected one number, or {len(self.joints)} as joints, got {len(self.noise)}")
+        return self
+
+    def urdf_text(self) -> str:
+        """Return the text of the file `urdf`.
+
+        Raises:
+            BagError: it cannot be read.
+        """
+        assert self.urdf is not None, "the bag has it"
+        try:
+            return self.urdf.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise BagError(f"{self.urdf}: expected the URDF that a mapping names, got: {error}") from error
+
+
 class GraspSource(_Strict):
     """A grasp that is known though no topic tells of it.
 
@@ -165,6 +209,7 @@ class Mapping(_Strict):
     object_poses: dict[str, PoseSource] = {}
     gripper_poses: dict[Literal["left", "right"], PoseSource] = {}
     wrenches: dict[Literal["left", "right"], WrenchSource] = {}
+    joint_efforts: dict[Literal["left", "right"], EffortSource] = {}  # where there is no wrench; bags only
     grasps: tuple[GraspSource, ...] = ()
     grasp_topic: str | None = None  # a topic of pbrl_msgs/Grasps
     scene_topic: str | None = None  # a topic of pbrl_msgs/Scene
@@ -189,6 +234,8 @@ class Mapping(_Strict):
         for role, wrench in self.wrenches.items():
             if wrench.axes not in {"sensor", *known}:
                 raise ValueError(f"{role}: axes: expected one of {sorted({'sensor', *known})}, got {wrench.axes!r}")
+        for role in set(self.wrenches) & set(self.joint_efforts):
+            raise ValueError(f"{role}: expected `wrenches` or `joint_efforts`, got both; a sensor is the better one")
         if self.scene_topic is None and not self.contract:
             for name in {*self.object_poses, *(grasp.object for grasp in self.grasps)} - set(self.bodies):
                 raise ValueError(f"body {name!r} has no geometry: describe it under `bodies`")
@@ -214,6 +261,11 @@ def load_mapping(path: Path | str) -> Mapping:
     if not isinstance(data, dict):
         raise BagError(f"{path}: expected a mapping of keys to values, got {type(data).__name__}; see config/mappings/")
     try:
-        return Mapping.model_validate(data)
+        mapping = Mapping.model_validate(data)
     except ValidationError as error:
         raise BagError(f"{path}: {explain(error, Mapping)}") from error
+    beside = {
+        side: each if each.urdf is None else each.model_copy(update={"urdf": path.parent / each.urdf})
+        for side, each in mapping.joint_efforts.items()
+    }
+    return mapping.model_copy(update={"joint_efforts": beside})

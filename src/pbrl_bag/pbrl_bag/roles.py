@@ -6,9 +6,9 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from pbrl_bag.mapping import Mapping, PoseSource, WrenchSource
+from pbrl_bag.mapping import EffortSource, Mapping, PoseSource, WrenchSource
 
-Kind = Literal["object_poses", "gripper_poses", "wrenches", "grasps", "scene"]
+Kind = Literal["object_poses", "gripper_poses", "wrenches", "joint_efforts", "description", "grasps", "scene"]
 
 GRASPS_TOPIC = "/grasps"
 SCENE_TOPIC = "/scene"
@@ -25,13 +25,13 @@ class Role:
 
     Attributes:
         kind: which part of a recording it fills.
-        name: body or gripper; empty for grasps and scene.
-        source: how to read it; None for grasps and scene.
+        name: body or gripper; empty for grasps, scene and description.
+        source: how to read it; None for grasps, scene and description.
     """
 
     kind: Kind
     name: str = ""
-    source: PoseSource | WrenchSource | None = None
+    source: PoseSource | WrenchSource | EffortSource | None = None
 
 
 def roles_of(topic: str, mapping: Mapping) -> tuple[Role, ...]:
@@ -47,15 +47,18 @@ def topic_of(kind: Kind, name: str, mapping: Mapping) -> str:
     sources: dict[str, PoseSource | WrenchSource] = {}
     if kind in ("object_poses", "gripper_poses", "wrenches"):
         sources = dict(getattr(mapping, kind))
+    if kind == "wrenches" and name in mapping.joint_efforts:
+        return mapping.joint_efforts[name].topic
     if name in sources:
         return sources[name].topic or ""
-    return {
+    named: dict[str, str] = {
         "object_poses": f"/ar_tags/{name}/pose",
         "gripper_poses": f"/ar_tags/{name}_gripper/pose",
         "wrenches": f"/wrist_ft/{name}",
         "grasps": mapping.grasp_topic or GRASPS_TOPIC,
         "scene": mapping.scene_topic or SCENE_TOPIC,
-    }[kind]
+    }
+    return named[kind]
 
 
 def _mapped(topic: str, mapping: Mapping) -> tuple[Role, ...]:
@@ -63,6 +66,9 @@ def _mapped(topic: str, mapping: Mapping) -> tuple[Role, ...]:
     roles = [Role("object_poses", name, s) for name, s in mapping.object_poses.items() if s.topic == topic]
     roles += [Role("gripper_poses", side, s) for side, s in mapping.gripper_poses.items() if s.topic == topic]
     roles += [Role("wrenches", side, wrench) for side, wrench in mapping.wrenches.items() if wrench.topic == topic]
+    arms = mapping.joint_efforts.items()
+    roles += [Role("joint_efforts", side, arm) for side, arm in arms if arm.topic == topic]
+    roles += [Role("description")] * any(arm.description == topic for _, arm in arms)
     roles += [Role("grasps")] * (mapping.grasp_topic == topic) + [Role("scene")] * (mapping.scene_topic == topic)
     return tuple(roles)
 
@@ -88,4 +94,4 @@ def _taken(role: Role, mapping: Mapping) -> bool:
         return mapping.grasp_topic is not None or bool(mapping.grasps)
     if role.kind == "scene":
         return mapping.scene_topic is not None
-    return role.name in getattr(mapping, role.kind)
+    return role.name in getattr(mapping, role.kind) or (role.kind == "wrenches" and role.name in mapping.joint_efforts)

@@ -42,6 +42,8 @@ class WrenchStream:
         exerted_on: "gripper": what gripper weight and world exert on the sensor (raw sensor, the
             contract's form); "object": what the gripper exerts on the object, already compensated.
         frame: "sensor", or "world" for a wrench already turned to world axes.
+        covariance: (6, 6) [N, N m] of an error that stays for seconds, in the axes of `frame`, typical of the time in
+            which something is held; NaN where torque is. None: a sensor's, which is small.
     """
 
     time: Array
@@ -49,6 +51,7 @@ class WrenchStream:
     torque: Array
     exerted_on: str = "gripper"
     frame: str = "sensor"
+    covariance: Array | None = None
 
 
 @dataclass(frozen=True)

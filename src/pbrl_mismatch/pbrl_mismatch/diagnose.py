@@ -35,6 +35,7 @@ from pbrl_mismatch.search.weigh import Weighed
 from pbrl_mismatch.unknown.describe import describe_unknown
 from pbrl_model.fitting.fit import body_of, motions_of
 from pbrl_model.predict import UNKNOWN_MASS
+from pbrl_model.sensing.wrench_error import wrench_error
 
 Array = NDArray[np.float64]
 
@@ -129,8 +130,20 @@ def diagnose(recording: Recording, options: DiagnoseOptions | None = None) -> Di
     objects = {}
     for name, each in zip(names, seeds, strict=True):
         track = track_of(recording, name)
-        objects[name] = _diagnose_object(each, track, lay_grips(recording, track), room, chosen)
+        found = _diagnose_object(each, track, lay_grips(recording, track), room, chosen)
+        error = wrench_error(recording, track.motions, body_of(recording.bodies[name], track.motions[0].oriented))
+        objects[name] = replace(found, notes=(*found.notes, *_poor_force(error)))
     return Diagnosis(recording.path, objects, time.perf_counter() - started)
+
+
+def _poor_force(error: float) -> tuple[str, ...]:
+    """Return a sentence where no sensor measured the force, which is then off by so much [N] for seconds."""
+    if error == 0.0:
+        return ()
+    return (
+        f"the force is not a sensor's: it is off by {error:.2g} N for seconds, and an effect that is no larger may be "
+        "the robot's own joints",
+    )
 
 
 def track_of(recording: Recording, name: str) -> Track:

@@ -63,6 +63,17 @@ def note_on_noise(noise: Array) -> tuple[str, ...]:
     )
 
 
+def note_on_wrench(error: float) -> tuple[str, ...]:
+    """Return a sentence where no sensor measured the wrenches; none otherwise.
+
+    Args:
+        error: how far off they are [N], see `pbrl_model.sensing.wrench_error`.
+    """
+    if error == 0.0:
+        return ()
+    return (f"the force is not a sensor's: it is off by {error:.2g} N for seconds, and what was learned is as vague",)
+
+
 def note_on_delay(delay: Array) -> tuple[str, ...]:
     """Return a sentence where the poses are known to come late, or early; none otherwise.
 

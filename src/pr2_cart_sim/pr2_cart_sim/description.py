@@ -9,11 +9,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from numpy.typing import NDArray
 
 from bullet_sim.client import BulletClient, Pose
-from pr2_cart_sim.errors import Pr2Error
+from bullet_sim.description import installed_description
 
 NAME = "pr2"
 SIDES = ("left", "right")
@@ -57,21 +56,8 @@ _JOINT = (
 
 
 def description_path() -> Path:
-    """Find the PR2's URDF in the installed workspace.
-
-    Raises:
-        Pr2Error: the package of robot descriptions is not installed, or has no PR2.
-    """
-    try:
-        share = Path(get_package_share_directory("pbrl_description"))
-    except PackageNotFoundError:
-        raise Pr2Error(
-            "package pbrl_description: expected in the ament index, not found; source the workspace"
-        ) from None
-    path = share / "pr2" / "pr2.urdf"
-    if not path.is_file():
-        raise Pr2Error(f"{path}: expected the PR2's URDF, there is no such file; build the workspace again")
-    return path
+    """Find the PR2's URDF in the installed workspace; raise SimError where it is not."""
+    return installed_description("pr2")
 
 
 @dataclass(frozen=True)

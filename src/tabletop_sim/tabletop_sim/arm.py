@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from numpy.typing import NDArray
 
 from bullet_sim.client import BulletClient, Pose, yaw_quaternion
+from bullet_sim.description import installed_description
 from bullet_sim.quiet import bullet
 from tabletop_sim.errors import TabletopError
 
@@ -25,21 +25,8 @@ BALL_FRICTION = 1.0
 
 
 def description_path() -> Path:
-    """Find the arm's URDF in the installed workspace.
-
-    Raises:
-        TabletopError: the package of robot descriptions is not installed, or has no such arm.
-    """
-    try:
-        share = Path(get_package_share_directory("pbrl_description"))
-    except PackageNotFoundError:
-        raise TabletopError(
-            "package pbrl_description: expected in the ament index, not found; source the workspace"
-        ) from None
-    path = share / "ball_arm" / "ball_arm.urdf"
-    if not path.is_file():
-        raise TabletopError(f"{path}: expected the ball arm's URDF, there is no such file; build the workspace again")
-    return path
+    """Find the arm's URDF in the installed workspace; raise SimError where it is not."""
+    return installed_description("ball_arm")
 
 
 class Arm:

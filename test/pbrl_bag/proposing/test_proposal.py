@@ -9,15 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from pbrl_bag import BagError, BagWriter, load_mapping, read_recording
+from pbrl_bag.joint_efforts.arm import Arm
 from pbrl_bag.proposing import mapping_text, propose
 from pbrl_bag.proposing.holding import held
-from pbrl_bag.proposing.proposal import side_of
+from pbrl_bag.proposing.words import side_of
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from foreign_push import CLOSED, CONTACT, LABS, OPENED, recorded
+from foreign_push import CLOSED, CONTACT, LABS, OPENED, Lab, recorded
+
+URDF = Path(__file__).resolve().parents[3] / "urdf" / "krang" / "krang.urdf"
+ARM = tuple(f"LJ{k}" for k in range(1, 8))
 
 WANTED = {
     "other topics": ("right", "table_7"),
@@ -115,6 +121,65 @@ def test_without_a_force_or_a_motion_it_is_said(tmp_path: Path) -> None:
     assert any("no pose of a thing that moved" in each for each in propose(still).left)
     handless = bag_of(tmp_path / "handless", [each for each in recorded(lab) if each[0] != lab.hand])
     assert any("no pose of the left sensor" in each for each in propose(handless).left)
+
+
+def by_joints(messages: list, lab: Lab) -> list:
+    """Return the push with the efforts of an arm and its description in place of the wrench."""
+    angles = np.array([1.9, 0.2, 0.4, -0.7, 0.3, 1.2, -0.4, 0.9, 0.2])[None]
+    arm = Arm(URDF.read_text(), ARM, "left_ft", (0.0, 0.0, -9.81), "test")
+    gravity, jacobian = arm.torques(angles)[0], arm.jacobians(angles)[0]
+    out = [("/robot_description", "std_msgs/msg/String", String(data=URDF.read_text()), 0)]
+    for topic, kind, message, when in messages:
+        if topic != lab.wrench:
+            out.append((topic, kind, message, when))
+            continue
+        force, torque = message.wrench.force, message.wrench.torque
+        felt = np.array([force.x, force.y, force.z, torque.x, torque.y, torque.z])
+        state = JointState(header=message.header, name=["wheel", *arm.chain], position=[0.0, *angles[0]])
+        state.effort = [0.0, 0.0, 0.0, *(gravity - jacobian.T @ felt + 0.01)]
+        out.append(("/joint_states", "sensor_msgs/msg/JointState", state, when))
+    return sorted(out, key=lambda message: message[3])
+
+
+def test_for_want_of_a_wrench_the_joints_of_the_arm_are_proposed(tmp_path: Path) -> None:
+    lab = LABS["transforms"]
+    bag = bag_of(tmp_path / "bag", by_joints(recorded(lab), lab))
+    proposal = propose(bag)
+    assert proposal.mapping is not None
+    source = proposal.mapping.joint_efforts["left"]
+    assert (source.topic, source.joints, source.tip) == ("/joint_states", ARM, "left_ft")
+    assert source.description == "/robot_description"
+    (why,) = [each.why for each in proposal.streams if each.role == "joint_efforts.left"]
+    assert why == "there is no wrench; 7 joints with efforts carry 'left_ft' in /robot_description"
+    assert any("`tip` is taken to be 'left_ft'" in each for each in proposal.left)
+    assert not any("no WrenchStamped" in each for each in proposal.left)
+    (grasp,) = proposal.mapping.grasps
+    assert grasp.start == pytest.approx(CLOSED, abs=0.2), "felt by the joints"
+    path = tmp_path / "mapping.yaml"
+    path.write_text(mapping_text(proposal, str(bag), {"desk": (1.2, 0.8)}))
+    assert "\nwrenches:" not in path.read_text()
+    with pytest.raises(BagError, match="with an empty hand"):
+        read_recording(bag, path)
+    path.write_text(path.read_text().replace("tip: left_ft,", "tip: left_ft, noise: 0.1,"))
+    found = read_recording(bag, path).wrenches["left"]
+    held = (found.time > CLOSED + 0.1) & (found.time < OPENED - 0.1)
+    np.testing.assert_allclose(found.force[held, 0], 15.0 + np.sin(found.time[held]), atol=0.05)
+
+
+def test_efforts_give_way_to_a_wrench_and_lack_a_description(tmp_path: Path) -> None:
+    lab = LABS["transforms"]
+    joints = by_joints(recorded(lab), lab)
+    both = propose(bag_of(tmp_path / "both", [*joints, *(each for each in recorded(lab) if each[0] == lab.wrench)]))
+    assert both.mapping is not None
+    assert not both.mapping.joint_efforts
+    assert [each.why for each in both.streams if each.stream == "/joint_states"] == [
+        "joint efforts, but there is a wrench, which is the better one"
+    ]
+    alone = propose(bag_of(tmp_path / "alone", [each for each in joints if each[0] != "/robot_description"]))
+    assert alone.mapping is not None
+    assert str(alone.mapping.joint_efforts["left"].urdf) == "robot.urdf"
+    assert any("give the robot's `urdf`, the joints of the arm alone" in each for each in alone.left)
+    assert len(alone.mapping.grasps) == 1
 
 
 def test_frames_that_nothing_links_are_said(tmp_path: Path) -> None:

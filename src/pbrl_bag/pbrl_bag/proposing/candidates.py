@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pbrl_bag.clocks import clock_offsets
-from pbrl_bag.decoding import PoseSample, poses_in, wrench_in
+from pbrl_bag.decoding import PoseSample, poses_in, seconds, wrench_in
 from pbrl_bag.foreign_bag import ForeignBag
 from pbrl_bag.reader import Decoder, files_of, opened
 from pbrl_bag.types import Array
@@ -18,6 +18,7 @@ from pbrl_bag.types import Array
 POSES = ("PoseStamped", "PoseWithCovarianceStamped", "Odometry", "TransformStamped")
 """Types of one pose each."""
 TRANSFORMS, ARRAY, WRENCH = "TFMessage", "PoseArray", "WrenchStamped"
+JOINTS, TEXT = "JointState", "String"
 STATIC = "/tf_static"
 
 
@@ -74,6 +75,36 @@ class WrenchCandidate:
 
 
 @dataclass
+class JointCandidate:
+    """Joint states of one topic.
+
+    Attributes:
+        topic: that they came on.
+        messages: as decoded, with efforts; in order.
+        lags: when each was heard less its stamp [s].
+        clock_offset: what their times have to be put right by [s].
+    """
+
+    topic: str
+    messages: list[Any] = field(default_factory=list)
+    lags: list[float] = field(default_factory=list)
+    clock_offset: float = 0.0
+
+    @property
+    def begins(self) -> float:
+        """Return the time of the first, put right [s]."""
+        return seconds(self.messages[0].header.stamp) + self.clock_offset
+
+    def driven(self) -> tuple[str, ...]:
+        """Return the joints that tell an effort: a number, and not always zero."""
+        told: dict[str, list[float]] = {}
+        for message in self.messages:
+            for name, effort in zip(message.name, message.effort, strict=False):
+                told.setdefault(str(name), []).append(float(effort))
+        return tuple(name for name, values in told.items() if np.isfinite(values).all() and np.any(values))
+
+
+@dataclass
 class Candidates:
     """What a bag holds.
 
@@ -81,12 +112,16 @@ class Candidates:
         types: of all topics.
         poses: by topic, child frame or place in an array, and frame that they are given in.
         wrenches: by topic.
+        joints: by topic; those without efforts are left out.
+        descriptions: text of a URDF by topic.
         fixed: (position, quaternion) of a frame in its parent, which never changes, by (parent, child).
     """
 
     types: dict[str, str] = field(default_factory=dict)
     poses: dict[tuple[str, str, str], PoseCandidate] = field(default_factory=dict)
     wrenches: dict[str, WrenchCandidate] = field(default_factory=dict)
+    joints: dict[str, JointCandidate] = field(default_factory=dict)
+    descriptions: dict[str, str] = field(default_factory=dict)
     fixed: dict[tuple[str, str], tuple[Array, Array]] = field(default_factory=dict)
 
 
@@ -102,7 +137,7 @@ def candidates_of(path: Path) -> Candidates:
         for message in file.messages():
             found.types[message.topic] = message.type
             kind = message.type.rsplit("/", 1)[-1]
-            if kind in (*POSES, TRANSFORMS, ARRAY, WRENCH):
+            if kind in (*POSES, TRANSFORMS, ARRAY, WRENCH, JOINTS, TEXT):
                 _take(found, message.topic, kind, decode(message), message.log_time * 1e-9)
     _put_clocks_right(found)
     return found
@@ -110,12 +145,15 @@ def candidates_of(path: Path) -> Candidates:
 
 def _put_clocks_right(found: Candidates) -> None:
     """Shift the times of what was stamped by another clock than the wrenches."""
-    streams: dict[str, PoseCandidate | WrenchCandidate] = {}
+    streams: dict[str, PoseCandidate | WrenchCandidate | JointCandidate] = {}
     streams.update({f"wrench {topic}": each for topic, each in found.wrenches.items()})
+    streams.update({f"joints {topic}": each for topic, each in found.joints.items()})
     streams.update({f"pose {key}": each for key, each in found.poses.items()})
     for name, offset in clock_offsets({name: each.lags for name, each in streams.items()}).items():
-        streams[name].clock_offset = offset
-        streams[name].rows = [(row[0] + offset, *row[1:]) for row in streams[name].rows]
+        stream = streams[name]
+        stream.clock_offset = offset
+        if not isinstance(stream, JointCandidate):
+            stream.rows = [(row[0] + offset, *row[1:]) for row in stream.rows]
 
 
 def _take(found: Candidates, topic: str, kind: str, message: Any, heard: float) -> None:
@@ -124,6 +162,16 @@ def _take(found: Candidates, topic: str, kind: str, message: Any, heard: float) 
         stream = found.wrenches.setdefault(topic, WrenchCandidate(topic, felt.frame))
         stream.rows.append((felt.time, *felt.force, *felt.torque))
         stream.lags.append(heard - felt.time)
+        return
+    if kind == JOINTS:
+        if len(message.effort):
+            joints = found.joints.setdefault(topic, JointCandidate(topic))
+            joints.messages.append(message)
+            joints.lags.append(heard - seconds(message.header.stamp))
+        return
+    if kind == TEXT:
+        if "<robot" in str(message.data):
+            found.descriptions[topic] = str(message.data)
         return
     for child, index, sample in _samples(topic, kind, message):
         if topic == STATIC and child is not None:

@@ -13,19 +13,12 @@ from scipy.spatial.transform import Rotation
 from pbrl_bag.errors import BagError
 from pbrl_bag.mapping import FramePose, GraspSource, Mapping, PoseSource, WrenchSource
 from pbrl_bag.proposing.candidates import Candidates, PoseCandidate, WrenchCandidate, candidates_of
+from pbrl_bag.proposing.efforts import Efforts, efforts_of
 from pbrl_bag.proposing.holding import Held, extent, held, while_felt
+from pbrl_bag.proposing.words import COMPENSATED, HANDS, NOT_A_NAME, ROBOT, side_of
 from pbrl_bag.roles import CONTRACT, roles_of
 from pbrl_bag.types import Array
 
-HANDS = re.compile(
-    r"gripper|hand|wrist|tool|tcp|eef|(^|[/_])ee([/_]|$)|end_?effector|flange|palm|finger|(^|[/_])ft([/_]|$)"
-)
-ROBOT = re.compile(
-    r"(^|[/_])(base|odom|odometry|torso|camera|head|imu|laser|map|world|footprint|arm|shoulder|elbow|link\d*)([/_]|$)"
-)
-LEFT, RIGHT = re.compile(r"(^|[/_])(left|l)([/_]|$)"), re.compile(r"(^|[/_])(right|r)([/_]|$)")
-COMPENSATED = re.compile(r"compensat|external|contact|filtered_net")
-NOT_A_NAME = re.compile(r"(pose|poses|odom|odometry|tf|transform|mocap|vicon|optitrack|ar_tags|_)+", re.IGNORECASE)
 STILL = 0.02
 """What reaches less far apart than this [m] did not move."""
 
@@ -67,6 +60,7 @@ class _Draft:
     grippers: dict[str, PoseCandidate] = field(default_factory=dict)
     objects: dict[str, PoseCandidate] = field(default_factory=dict)
     wrenches: dict[str, WrenchCandidate] = field(default_factory=dict)
+    efforts: dict[str, Efforts] = field(default_factory=dict)
 
 
 def propose(path: Path) -> Proposal:
@@ -93,13 +87,8 @@ def propose(path: Path) -> Proposal:
     draft = _Draft()
     _wrenches(found, draft)
     _poses(found, draft)
+    _efforts(found, draft)
     return Proposal(_mapping(found, draft), tuple(draft.streams), tuple(draft.left))
-
-
-def side_of(name: str) -> str:
-    """Return "left", "right", or nothing where a name does not say."""
-    low = name.lower()
-    return "left" if LEFT.search(low) else "right" if RIGHT.search(low) else ""
 
 
 def _wrenches(found: Candidates, draft: _Draft) -> None:
@@ -114,8 +103,30 @@ def _wrenches(found: Candidates, draft: _Draft) -> None:
         draft.wrenches[side] = each
         why = f"a wrench whose name says {told}" if told else f"a wrench; no side in its name, taken for the {side} one"
         draft.streams.append(Proposed(each.topic, f"wrenches.{side}", why))
-    if not draft.wrenches:
-        draft.left.append("no WrenchStamped was found: without a force nothing can be learned; record the wrist sensor")
+
+
+def _efforts(found: Candidates, draft: _Draft) -> None:
+    """Where there is no wrench at all, let the joints of each hand's arm stand in for it."""
+    for topic in sorted(found.joints):
+        if draft.wrenches:
+            draft.streams.append(Proposed(topic, "", "joint efforts, but there is a wrench, which is the better one"))
+    if draft.wrenches:
+        return
+    for side, hand in draft.grippers.items():
+        name = (hand.child or "").rsplit("/", 1)[-1]
+        efforts = efforts_of(side, name, found.joints, found.descriptions)
+        if efforts is not None:
+            draft.efforts[side] = efforts
+            draft.left += efforts.left
+            draft.streams.append(Proposed(efforts.source.topic, f"joint_efforts.{side}", efforts.why))
+            if efforts.source.description is not None:
+                said = Proposed(efforts.source.description, "description", "a URDF: lengths and weights of the arm")
+                draft.streams.append(said)
+    if not draft.efforts:
+        draft.left.append(
+            "no WrenchStamped was found, and no joint efforts of an arm that holds: without a force nothing can be "
+            "learned; record the wrist sensor"
+        )
 
 
 def _poses(found: Candidates, draft: _Draft) -> None:
@@ -126,7 +137,8 @@ def _poses(found: Candidates, draft: _Draft) -> None:
         each, far = found.poses[key], moved[key]
         low, label = each.name.lower(), _label(each)
         if HANDS.search(low):
-            side = side_of(low) or next((s for s in draft.wrenches if s not in draft.grippers), "")
+            sides = draft.wrenches or (("left", "right") if found.joints else ())
+            side = side_of(low) or next((s for s in sides if s not in draft.grippers), "")
             if side and side not in draft.grippers:
                 draft.grippers[side] = each
                 draft.streams.append(Proposed(label, f"gripper_poses.{side}", "its name is that of a hand"))
@@ -198,6 +210,7 @@ def _mapping(found: Candidates, draft: _Draft) -> Mapping:
         object_poses={name: _pose_source(each, world) for name, each in draft.objects.items()},
         gripper_poses={side: _pose_source(each, world) for side, each in draft.grippers.items()},
         wrenches={side: _wrench_source(each, world, places) for side, each in draft.wrenches.items()},
+        joint_efforts={side: each.source for side, each in draft.efforts.items()},
         grasps=grasps,
     )
 
@@ -242,16 +255,20 @@ def place_of(frame: str, world: str, found: Candidates) -> FramePose | None:
 
 def _grasps(draft: _Draft, places: dict[str, FramePose], found: Candidates, world: str) -> tuple[GraspSource, ...]:
     """Find who held what, from how they moved."""
-    begun = min((row[0] for each in _used(draft) for row in each.rows[:1]), default=0.0)
+    firsts = [row[0] for each in _used(draft) for row in each.rows[:1]]
+    begun = min([*firsts, *(each.begins for each in draft.efforts.values())], default=0.0)
     grasps = []
     for side, gripper in draft.grippers.items():
-        if side not in draft.wrenches:
+        felt = draft.wrenches[side].array() if side in draft.wrenches else None
+        if side in draft.efforts:
+            felt = draft.efforts[side].felt
+        elif felt is None:
             continue
         options: list[tuple[str, Held]] = []
         for name, each in draft.objects.items():
             together = held(_in_world(each, places), _in_world(gripper, places))
             if together is not None:
-                options.append((name, while_felt(together, draft.wrenches[side].array())))
+                options.append((name, together if felt is None else while_felt(together, felt)))
         if not options:
             continue
         name, best = max(options, key=lambda pair: (pair[1].share, pair[1].end - pair[1].start))

@@ -6,7 +6,7 @@ import math
 
 import yaml
 
-from pbrl_bag.mapping import FramePose, Mapping, PoseSource, WrenchSource
+from pbrl_bag.mapping import EffortSource, FramePose, Mapping, PoseSource, WrenchSource
 from pbrl_bag.proposing.proposal import Proposal
 
 SIZE = "[[-0.6, -0.4], [0.6, -0.4], [0.6, 0.4], [-0.6, 0.4]]"
@@ -39,7 +39,8 @@ def mapping_text(proposal: Proposal, source: str, sizes: dict[str, tuple[float, 
         else:
             lines += [f"  # {name}:", f"  #   footprint: {SIZE} # [m] counter-clockwise", "  #   height: 0.7 # [m]"]
         lines.append(f"  {'' if math.isfinite(length) else '# '}  # nominal_mass: 20.0 # [kg] if somebody knows it")
-    sources: list[PoseSource | WrenchSource] = [
+    sources: list[PoseSource | WrenchSource | EffortSource] = [
+        *mapping.joint_efforts.values(),
         *mapping.object_poses.values(),
         *mapping.gripper_poses.values(),
         *mapping.wrenches.values(),
@@ -50,8 +51,14 @@ def mapping_text(proposal: Proposal, source: str, sizes: dict[str, tuple[float, 
     lines += [f"  {name}: {_pose(each)}" for name, each in mapping.object_poses.items()]
     lines += ["", "gripper_poses: # of the force-torque sensor's frame; `offset` where another one was seen"]
     lines += [f"  {side}: {_pose(each)}" for side, each in mapping.gripper_poses.items()]
-    lines += ["", "wrenches: # exerted_on: gripper is a raw sensor; object one that was compensated, gripper on object"]
-    lines += [f"  {side}: {_wrench(each)}" for side, each in mapping.wrenches.items()]
+    if mapping.joint_efforts:
+        lines += ["", "joint_efforts: # for want of a wrench; tip: the link whose pose gripper_poses tells"]
+        lines += ["  # noise [N m]: how far off an effort is for seconds; left out: as seen while the hand is empty"]
+        lines += [f"  {side}: {_efforts(each)}" for side, each in mapping.joint_efforts.items()]
+    else:
+        said = "exerted_on: gripper is a raw sensor; object one that was compensated, gripper on object"
+        lines += ["", f"wrenches: # {said}"]
+        lines += [f"  {side}: {_wrench(each)}" for side, each in mapping.wrenches.items()]
     lines += ["", "grasps: # seconds after the first sample, and where the gripper holds, in the body's frame"]
     for grasp in mapping.grasps:
         told = grasp.model_dump(exclude_none=True)
@@ -78,7 +85,13 @@ def _wrench(source: WrenchSource) -> str:
     return _flow(told | _clock(source))
 
 
-def _clock(source: PoseSource | WrenchSource) -> dict[str, float]:
+def _efforts(source: EffortSource) -> str:
+    where = {"description": source.description} if source.urdf is None else {"urdf": str(source.urdf)}
+    told = {"topic": source.topic, "joints": list(source.joints), "tip": source.tip}
+    return _flow(told | where | _clock(source))
+
+
+def _clock(source: PoseSource | WrenchSource | EffortSource) -> dict[str, float]:
     """Return what to say of a stream's clock, where it is another than the others'."""
     return {"clock_offset": source.clock_offset} if source.clock_offset else {}
 

@@ -29,6 +29,7 @@ from pbrl_control.kinematics import SIDES, RobotKinematics
 from pbrl_control.loop import LoopCommand
 from pbrl_control.navigation import KRANG_STOWED, reaching_arms
 from pbrl_control.percept import Grip, Percept, Tag, gripper_tag
+from pbrl_control.planar import placed
 from pbrl_control.push import GripperAnswer, Phase
 from pbrl_control.settings import ControllerSettings, load_section
 
@@ -137,7 +138,7 @@ def provoked_trial(seed: int, number: int, step: float = STEP) -> GraspTrial:
 def _scene(rng: np.random.Generator, furnished: bool) -> Scene:
     """Draw a room: the table, the robot `AWAY` from it at any bearing and heading, perhaps one thing more."""
     table = (*rng.uniform(-0.3, 0.3, 2), rng.uniform(-math.pi, math.pi))
-    outline = _placed(_box(*SIZE), table)
+    outline = shapely.Polygon(placed(_box(*SIZE), np.array(table)))
     bodies: dict[str, Any] = {TABLE: _table(SIZE, 33.0, table)}
     robot, taken = _robot_pose(outline, rng)
     if furnished:
@@ -168,7 +169,7 @@ def _robot_pose(table: shapely.Polygon, rng: np.random.Generator) -> tuple[tuple
     """Draw where the robot stands, and what it covers with its arms ahead."""
     x, y = table.buffer(AWAY).exterior.interpolate(rng.uniform(), normalized=True).coords[0]
     pose = (float(x), float(y), rng.uniform(-math.pi, math.pi))
-    parts = [_placed(shape.outline, pose) for shape in (KRANG_STOWED, reaching_arms(0.16))]
+    parts = [shapely.Polygon(placed(shape.outline, np.array(pose))) for shape in (KRANG_STOWED, reaching_arms(0.16))]
     return pose, shapely.union_all(parts)
 
 
@@ -179,7 +180,7 @@ def _furniture(table: shapely.Polygon, robot: shapely.Polygon, rng: np.random.Ge
     size = (0.4, 0.4) if pillar else (0.80, 1.60)
     while True:
         pose = (*rng.uniform(-ROOM, ROOM, 2), rng.uniform(-math.pi, math.pi))
-        place = _placed(_box(*size), pose)
+        place = shapely.Polygon(placed(_box(*size), np.array(pose)))
         if room.contains(place) and place.distance(table) >= GAP and place.distance(robot) >= 0.15:
             break
     if pillar:
@@ -189,11 +190,6 @@ def _furniture(table: shapely.Polygon, robot: shapely.Polygon, rng: np.random.Ge
 
 def _box(x: float, y: float) -> Array:
     return 0.5 * np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
-
-
-def _placed(outline: Array, pose: tuple[float, ...]) -> shapely.Polygon:
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    return shapely.Polygon(outline @ np.array([[c, s], [-s, c]]) + pose[:2])
 
 
 class _Fetching(Manipulation):

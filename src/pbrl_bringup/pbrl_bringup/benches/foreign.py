@@ -1,4 +1,7 @@
-"""A push as five other laboratories would have recorded it: roles are proposed, and it is fitted like the native."""
+"""A push as five other laboratories would have recorded it: roles are proposed, and it is fitted like the native.
+
+A sixth has no wrist sensor: the efforts of its arm stand in for one, and its fit agrees as far as it claims to know.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +27,9 @@ from pbrl_bag.metadata import files_of_bag
 from pbrl_bag.proposing import mapping_text, propose
 from pbrl_bag.reader import Decoder
 from pbrl_bag.types import BodyGeometry
+from pbrl_bringup.benches.foreign_efforts import by_efforts
 from pbrl_bringup.benches.foreign_labs import LABS, WRENCH, Lab, Message, fixed_frame, hand_seen, stamp, table_seen
-from pbrl_bringup.benches.rows import Measured, at_least
+from pbrl_bringup.benches.rows import Measured, at_least, at_most
 from pbrl_bringup.simulate import simulate_push
 from pbrl_bringup.terminal import progress
 from pbrl_control.push_plan import load_plan
@@ -46,6 +50,10 @@ STORAGES: dict[str, Storage] = {
 """How each laboratory keeps its bags, all written by another library than ours."""
 RIGHT, APART = 4, 0.5
 """Bags whose roles are to be proposed rightly; how far a mean may be from the native one, in its deviations."""
+WITHOUT_SENSOR = "transforms"
+"""Whose push is told by an arm's efforts as well."""
+AGREES = 2.0
+"""Deviations of its own, wider posterior that a fit by efforts may be off the native one."""
 CLOSE, AT_ONCE = 0.005, 0.1
 """Poses [m] and times [s] that agree; what a picture takes on its way cannot be told from a clock that is late."""
 
@@ -73,6 +81,27 @@ class Retold:
     as_told: dict[str, float]
 
 
+@dataclass(frozen=True)
+class ByEfforts:
+    """What became of the bag without a wrist sensor.
+
+    Attributes:
+        right: whether the arm's joints, its hand and the description were proposed.
+        off: root mean square by which the force at the hand is off while it holds [N].
+        told: what the mapping's reader says of that, one standard deviation [N].
+        apart: how far each mean is from the native one over the same seconds, in standard deviations of its own.
+        wider: its standard deviation over the native one's, by parameter.
+        notes: what the reader says.
+    """
+
+    right: bool
+    off: float
+    told: float
+    apart: dict[str, float]
+    wider: dict[str, float]
+    notes: tuple[str, ...]
+
+
 def measure(seed: int, quick: bool, out: Path) -> Measured:
     """Record a push, retell it five ways, map and fit each."""
     bag = simulate_push(load_scene(SCENE), load_plan(PLAN), seed, out / "native").bag
@@ -87,6 +116,7 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
             path = write(out / name.replace(" ", "_"), STORAGES[name], messages)
             found.append(judged(name, path, native, own, seed))
             bar(number + 1)
+    efforts = judged_by_efforts(bag, native, out, seed)
     worst = max(max(each.apart.values(), default=np.inf) for each in found)
     as_told = max(max(each.as_told.values(), default=np.inf) for each in found)
     agree = sum(max(each.apart.values(), default=np.inf) <= APART for each in found)
@@ -102,7 +132,19 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
             furthest_over_the_seconds_that_the_native_topic_tells=as_told,
         ),
     ]
-    return Measured(rows, {"bags": [asdict(each) for each in found], "native": own.summary()})
+    rows += [
+        at_least("bag with joint efforts and no wrench: arm, hand and description proposed", efforts.right, "1", 1),
+        at_most(
+            "its fit beside the native one's, furthest mean in its own, wider deviations",
+            max(efforts.apart.values(), default=np.inf),
+            "1",
+            AGREES,
+            force_off_newtons=efforts.off,
+            wider_at_most=max(efforts.wider.values(), default=np.inf),
+        ),
+    ]
+    details = {"bags": [asdict(each) for each in found], "efforts": asdict(efforts), "native": own.summary()}
+    return Measured(rows, details)
 
 
 def retold(bag: Path, native: Recording, lab: Lab) -> list[Message]:
@@ -174,6 +216,43 @@ def judged(lab: str, path: Path, native: Recording, own: Posterior, seed: int) -
     there = fit_recording(replace(native, grasps=(seconds,)), options).objects[own.object].posterior
     begins, ends = grasp.start - told.start, grasp.end - told.end
     return Retold(lab, STORAGES[lab], right, begins, ends, apart(learned, there), apart(learned, own))
+
+
+def judged_by_efforts(bag: Path, native: Recording, out: Path, seed: int) -> ByEfforts:
+    """Tell the push by the efforts of the arm that made it, with no sensor at its wrist, map and fit it."""
+    lab, told = LABS[WITHOUT_SENSOR], native.grasps[0]
+    messages = by_efforts(bag, retold(bag, native, lab), lab.wrench, told.gripper, seed)
+    path = write(out / "efforts", "sqlite", messages)
+    proposal = propose(path)
+    source = proposal.mapping.joint_efforts.get("left") if proposal.mapping is not None else None
+    if proposal.mapping is None or source is None:
+        return ByEfforts(False, np.nan, np.nan, {}, {}, ())
+    right = source.tip == f"{told.gripper}_ft" and {f"LJ{k}" for k in range(1, 8)} <= set(source.joints)
+    body, geometry = next(iter(proposal.mapping.object_poses)), native.bodies[told.object]
+    mapping = out / "efforts.yaml"
+    mapping.write_text(completed(mapping_text(proposal, str(path), {body: sides(geometry)}), geometry))
+    recording = read_recording(path, mapping)
+    felt, truth, grasp = recording.wrenches["left"], native.wrenches[told.gripper], recording.grasps[0]
+    held = (felt.time > grasp.start) & (felt.time < grasp.end)
+    there = np.column_stack([np.interp(felt.time[held], truth.time, column) for column in truth.force.T])
+    off = felt.force[held] - there
+    assert felt.covariance is not None, "efforts say how far off they are"
+    seconds = replace(told, start=grasp.start, end=grasp.end)
+    own = fit_recording(replace(native, grasps=(seconds,)), FitOptions(seed=seed)).objects[told.object].posterior
+    learned = fit_recording(recording, FitOptions(seed=seed)).objects[body].posterior
+    wider = {
+        name: float(each["sd"]) / float(own.summary()[name]["sd"])
+        for name, each in learned.summary().items()
+        if name not in ANGLES
+    }
+    return ByEfforts(
+        right,
+        float(np.sqrt(np.mean(np.sum((off - off.mean(axis=0)) ** 2, axis=1) / 3.0))),
+        float(np.sqrt(np.trace(felt.covariance[:3, :3]) / 3.0)),
+        apart(own, learned),
+        wider,
+        recording.notes,
+    )
 
 
 def apart(one: Posterior, other: Posterior) -> dict[str, float]:

@@ -27,6 +27,7 @@ BENCHES = {
     "next-experiment": "pushes until it is known what was left out, chosen by information or at random",
     "foreign": "a push as five other laboratories would have recorded it: roles proposed, fitted like the native one",
     "played-again": "what is learned live, and from the recording of it played again: number for number",
+    "two-robots": "two robots in one ROS domain, each in a namespace: both move a table out of the way and arrive",
     "view": "the viewer on ten minutes of five objects: first picture, pictures a second, console",
     "mismatch": "the watch over a stream: half an hour of clean pushing without an alarm, and how late alarms are",
 }

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pbrl_bag.types import BodyGeometry
+from pbrl_control.planar import placed
 from pbrl_mismatch.data.residual import ResidualWrench
 from pbrl_mismatch.diagnose import ObjectDiagnosis
 
@@ -36,7 +37,7 @@ def floor(body: BodyGeometry, found: ObjectDiagnosis) -> str:
     residual = found.residual
     time = residual.time
     for sample in _spaced(time, OUTLINE_EVERY):
-        corners = _placed(body.footprint, residual.state[sample, :3])
+        corners = placed(body.footprint, residual.state[sample, :3])
         axes.fill(*corners.T, facecolor="none", edgecolor=GREY, lw=0.6, alpha=0.6)
     for episode in np.split(np.arange(len(time)), residual.first[1:]):
         axes.plot(*residual.state[episode, :2].T, color="black", lw=1.0)
@@ -79,14 +80,14 @@ def _where(axes: Axes, entry: Mapping[str, Any], last: Array) -> None:
     if not where or not where.get("shape"):
         return
     shape = np.array(where["shape"], dtype=float).reshape(-1, 2)
-    shape = shape if where["frame"] in ON_THE_FLOOR else _placed(shape, last)
+    shape = shape if where["frame"] in ON_THE_FLOOR else placed(shape, last)
     if len(shape) > 2:
         axes.fill(*shape.T, facecolor=PURPLE, alpha=0.2, edgecolor=PURPLE, lw=1.5, zorder=4)
     else:
         axes.plot(*shape.T, "P", color=PURPLE, ms=10, zorder=4)
     if where.get("uncertainty"):
         around = np.array(where["uncertainty"], dtype=float)
-        around = around if where["frame"] in ON_THE_FLOOR else _placed(around, last)
+        around = around if where["frame"] in ON_THE_FLOOR else placed(around, last)
         axes.plot(*np.vstack([around, around[:1]]).T, color=PURPLE, lw=1.0, ls=(0, (4, 3)), zorder=4)
     top = shape[np.argmax(shape[:, 1])]
     axes.annotate(
@@ -180,8 +181,3 @@ def _spaced(time: Array, every: float) -> Sequence[int]:
             chosen.append(sample)
             last = moment
     return chosen
-
-
-def _placed(outline: Array, pose: Array) -> Array:
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    return pose[:2] + outline @ np.array([[c, s], [-s, c]])

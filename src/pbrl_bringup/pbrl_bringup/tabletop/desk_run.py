@@ -15,14 +15,11 @@ from pbrl_control.ball_arm import BallArm, Strokes
 from pbrl_control.planar import Array, yaw_of
 from pbrl_model.tags.calibration import CameraCalibration, calibration
 from pbrl_planner.tabletop import Desk, Item, ItemFinder, Push, Sight, Table, TallItem
+from pbrl_planner.tabletop.desk import REACH_MARGIN
+from pbrl_planner.tabletop.primitives import APPROACH
 from tabletop_sim.arm import description_path
 from tabletop_sim.scene import DeskScene
 from tabletop_sim.session import DeskSession
-
-REACH_MARGIN = 0.01
-"""[m] kept from where the arm is stretched out, or folded up."""
-APPROACH = 0.01
-"""[m] between ball and item as a push begins."""
 
 
 class DeskRun:

@@ -32,8 +32,9 @@ from pbrl_model.prior_options import PriorOptions
 from pbrl_model.priors import Prior, table2_prior
 from pbrl_model.sensing.checks import check_recording
 from pbrl_model.sensing.motion import Motion, observe
+from pbrl_model.sensing.wrench_error import wrench_error
 from pbrl_model.symmetry import wrap
-from pbrl_model.verdicts import note_on_delay, note_on_left_out, note_on_noise, notes_on
+from pbrl_model.verdicts import note_on_delay, note_on_left_out, note_on_noise, note_on_wrench, notes_on
 
 __all__ = ["Fit", "FitOptions", "ObjectFit", "body_of", "fit_recording", "motions_of", "target_of"]
 
@@ -180,13 +181,16 @@ def body_of(geometry: BodyGeometry, oriented: bool) -> MassProperties:
     return body if oriented else replace(body, com=np.zeros(2))
 
 
-def target_of(geometry: BodyGeometry, likelihood: WindowedLikelihood, options: FitOptions) -> Target:
+def target_of(
+    geometry: BodyGeometry, likelihood: WindowedLikelihood, options: FitOptions, error: float = 0.0
+) -> Target:
     """Put prior, likelihood and what is not learned together.
 
     Args:
         geometry: footprint, nominal mass, pose in the scene.
         likelihood: of the recorded poses.
         options: class, priors and left-out force.
+        error: of the wrenches themselves in one window [N]; it adds to the left-out force.
 
     Raises:
         ModelError: an option does not fit the footprint.
@@ -198,7 +202,7 @@ def target_of(geometry: BodyGeometry, likelihood: WindowedLikelihood, options: F
     radius = 1.0 if options.model_class == "hinge" else math.nan
     base = BodyParameters(mass=mass, hinge_radius=radius)
     usual = LEFT_OUT_BESIDE_GROUND if "mu_ground" in prior.names else LEFT_OUT_FORCE
-    return Target(prior.names, prior, likelihood, base, ties, options.left_out_force or usual)
+    return Target(prior.names, prior, likelihood, base, ties, math.hypot(options.left_out_force or usual, error))
 
 
 def _priors(options: FitOptions) -> PriorOptions:
@@ -227,6 +231,7 @@ def _fit_object(rng: np.random.Generator, recording: Recording, name: str, optio
     delay = found.position[..., target.simulated - 1]
     notes = notes_on(posterior, target.prior, motions, rng) + note_on_noise(noise) + found.notes
     if target.likelihood.with_drag:
+        notes += note_on_wrench(wrench_error(recording, motions, body))
         notes += note_on_left_out(noise, target.left_out_force) + note_on_delay(delay)
     return ObjectFit(replace(posterior, notes=notes), noise, delay, found.acceptance, heldout, motions, body)
 
@@ -276,7 +281,9 @@ def _observed(
     parts = split(motions, options)
     body = body_of(recording.bodies[name], motions[0].oriented)
     likelihood = WindowedLikelihood(body, parts.fitted, with_drag=options.likelihood == "windowed")
-    return motions, parts, target_of(recording.bodies[name], likelihood, options)
+    # Windows are fitted with a left-out force each, as if the next had another; what joints are off is alike in all.
+    error = wrench_error(recording, motions, body) * math.sqrt(len(parts.fitted))
+    return motions, parts, target_of(recording.bodies[name], likelihood, options, error)
 
 
 def _plan(options: FitOptions) -> SearchPlan:

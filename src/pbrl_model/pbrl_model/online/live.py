@@ -6,6 +6,7 @@ from typing import Any
 
 from pbrl_bag.builder import RecordingBuilder
 from pbrl_bag.decoding import seconds
+from pbrl_bag.mapping import PoseSource, WrenchSource
 from pbrl_bag.roles import CONTRACT, GRASPS_TOPIC, SCENE_TOPIC, roles_of
 from pbrl_bag.types import Recording
 
@@ -86,7 +87,7 @@ class LiveRecording:
         starts = self._open_since()
         for topic in self._last:
             for role in roles_of(topic, CONTRACT):
-                if role.source is None:
+                if not isinstance(role.source, PoseSource | WrenchSource):
                     continue
                 rows = self._builder.samples(role.kind, role.name, topic, role.source).rows
                 rows[:] = [

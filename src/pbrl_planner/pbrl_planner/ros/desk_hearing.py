@@ -26,12 +26,11 @@ from pbrl_model.ros.pictures import calibration_from_msgs, grey_image
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.ros.conversions import planar_pose, transform_from_msg
 from pbrl_planner.tabletop import Desk, Item, ItemFinder, Table, TallItem
+from pbrl_planner.tabletop.desk import REACH_MARGIN
 
 FRAMES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PICTURES = QoSProfile(depth=2, reliability=ReliabilityPolicy.BEST_EFFORT)
 WORLD, BASE = "world", "arm_base"
-REACH_MARGIN = 0.01
-"""[m] kept from where the arm is stretched out, or folded up."""
 POSES_WITHIN = 0.3
 """[s] in which the poses of all items have to come to count as one look."""
 SAID = 5.0

@@ -12,6 +12,9 @@ from pbrl_control.planar import Array
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.tabletop.box_kernel import box_fault
 
+REACH_MARGIN = 0.01
+"""[m] kept from where the arm is stretched out, or folded up."""
+
 
 @dataclass(frozen=True)
 class Item:

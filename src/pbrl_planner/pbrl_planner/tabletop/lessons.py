@@ -19,12 +19,8 @@ from pbrl_control.settings import Positive, Section
 from pbrl_planner.tabletop.box_kernel import ball_meets, box_fault
 from pbrl_planner.tabletop.desk import Desk
 from pbrl_planner.tabletop.displacement import LearnedDisplacements
-from pbrl_planner.tabletop.primitives import Push, displaced, displacement
+from pbrl_planner.tabletop.primitives import APPROACH, Push, displaced, displacement
 from pbrl_planner.tabletop.task import Ended, Ending, NextPush
-
-APPROACH = 0.01
-"""[m] between ball and item as a push begins."""
-
 
 LESS_ROOM = (1.0, 0.5, 0.2)
 """Shares of the room that is kept: items that lie close together have to come apart before they can be taught."""

@@ -16,12 +16,10 @@ from pbrl_model.pushing import ObservedPush, PushPosterior, learn_pushes
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.tabletop.desk import Item
 from pbrl_planner.tabletop.displacement import Displacements
-from pbrl_planner.tabletop.primitives import Push
+from pbrl_planner.tabletop.primitives import APPROACH, Push
 
 GROWTH = 1.3
 """Factor by which what was observed of an item has to grow before it is learned from anew: it takes a second."""
-APPROACH = 0.01
-"""[m] between ball and item as a push begins; what comes before the touch changes nothing."""
 
 
 class PhysicsDisplacements:

@@ -22,6 +22,8 @@ _LAID_OUT = {
     "+turn": ((END, -1.0), (0.0, 1.0)),
     "-turn": ((END, 1.0), (0.0, -1.0)),
 }
+APPROACH = 0.01
+"""[m] between ball and item as a push begins; what comes before the touch changes nothing."""
 PRIMITIVES = tuple(_LAID_OUT)
 """Named after what they are meant to do to the item, in its own frame."""
 
