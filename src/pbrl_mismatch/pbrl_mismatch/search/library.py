@@ -23,6 +23,7 @@ from pbrl_mismatch.search.path.climb import PathPeak
 from pbrl_mismatch.search.path.ground import ground_of, traced
 from pbrl_mismatch.search.path.pins import may_be_pinned
 from pbrl_mismatch.search.path.starts import starts_of
+from pbrl_mismatch.search.second import KEPT, is_another, parted_starts
 
 Array = NDArray[np.float64]
 
@@ -82,6 +83,14 @@ def search_library(
     def begin(k: int) -> PathPeak:
         return starts_of(np.random.default_rng(seeds[k]), *jobs[k], options)
 
+    def begin_simulated(k: int) -> tuple[Hypothesis, Array]:
+        (name, _, base, _), found = jobs[k], begun[k]
+        if not is_another(name, base):
+            return found.hypothesis, found.coordinates
+        rng = np.random.default_rng(seeds[k].spawn(1)[0])
+        two = parted_starts(rng, found.hypothesis, base, stages.fitted[0], options)
+        return found.hypothesis, np.concatenate([two, found.coordinates])
+
     with ThreadPoolExecutor(options.workers) as pool:
         begun = list(pool.map(begin, range(len(jobs))))
         if least > -math.inf:
@@ -97,10 +106,12 @@ def search_library(
         pins = [k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].pins and may_be_pinned(longest.track)]
         # A pin is so stiff that a path a millimetre off says nothing of it; and the first of two wheels has taken on
         # what both do, so that along its path the second has nothing to explain.
-        chosen = sorted({*chosen, *pins, *(k for k, (name, _, base, _) in enumerate(jobs) if _another(name, base))})
-        running = [(begun[k].hypothesis, begun[k].coordinates) for k in chosen]
+        chosen = sorted({*chosen, *pins, *(k for k, (name, _, base, _) in enumerate(jobs) if is_another(name, base))})
+        running = list(pool.map(begin_simulated, chosen))
+        # Short windows rank ways to part a wheel no better than the path does: several go on.
+        kept = {hypothesis.variant: KEPT for hypothesis, starts in running if len(starts) > options.keep[0]}
         first = _survivors([each.hypothesis for each in begun], begun, LEADING, 0.0)
-        leading = {begun[k].hypothesis.variant for k in (*first, *pins)}
+        leading = {begun[k].hypothesis.variant for k in (*first, *pins)} | set(kept)
         before: list[Peak | None] = [None] * len(running)
         for stage in range(len(stages.fitted)):
             rough = stage + 2 < len(stages.fitted)
@@ -114,10 +125,10 @@ def search_library(
             before = [peaks[k] for k in chosen]
             running = [
                 (
-                    running[k][0],
-                    apart(_ordered(peaks[k]).coordinates, running[k][0].spread, options.keep[stage + 1]),
+                    each,
+                    apart(_ordered(peaks[k]).coordinates, each.spread, kept.get(each.variant, options.keep[stage + 1])),
                 )
-                for k in chosen
+                for k, each in ((k, running[k][0]) for k in chosen)
             ]
         done = [
             Fitted(job[0], alone(peak), None, None, None if shorter is None else alone(shorter))
@@ -144,11 +155,6 @@ def _same(name: str, base: Fitted, options: DiagnoseOptions) -> bool:
     """Tell whether an effect on a base is what some baseline is: a first wheel is no second one."""
     wheels = [kind for kind in options.baseline if "wheel" in kind or "caster" in kind]
     return EFFECTS[name].second and bool(wheels) and "wheel_x" not in base.hypothesis.columns
-
-
-def _another(name: str, base: Fitted) -> bool:
-    """Tell whether an effect is one more of what a base has already."""
-    return EFFECTS[name].second and "wheel_x" in base.hypothesis.columns
 
 
 def _climbed(cuts: Cuts, iterations: int, options: DiagnoseOptions, rough: bool, job: tuple[Hypothesis, Array]) -> Peak:
