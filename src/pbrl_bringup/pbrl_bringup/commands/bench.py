@@ -72,6 +72,8 @@ def command(
         raise BringupError(
             f"bench {name}: expected no --minutes, got {minutes:g}; {', '.join(WITH_SETS)} can go on later"
         )
+    if scheduler is not None and name == "scale":
+        raise BringupError(f"bench scale: expected no --scheduler, got {scheduler}; it compares clusters of its own")
     more: dict[str, Any] = {"sets": sets} if sets else {}
     more |= {} if most is None else {"most": most}
     more |= {} if minutes is None else {"minutes": minutes}

@@ -54,10 +54,10 @@ def _started(chosen: Scheduler) -> Iterator[Client]:
             threads_per_worker=1,
             processes=True,
             host=LOOPBACK,
+            dashboard_address=None,
             scheduler_kwargs=place,
             silence_logs=logging.CRITICAL,
             env=alone,
-            **place,
         ) as made,
         Client(made, set_as_default=False) as client,
     ):

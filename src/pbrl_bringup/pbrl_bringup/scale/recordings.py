@@ -43,8 +43,7 @@ def choose_recordings(given: Sequence[Path], listed: Path | None) -> Chosen:
     """
     if not given and listed is None:
         raise BringupError("expected at least one bag, or --list FILE with a bag on each line, got neither")
-    found = [_found(path) for path in given]
-    bags = [*chain(*found), *(_listed(listed) if listed is not None else ())]
+    bags = [*chain(*map(_found, given)), *(_listed(listed) if listed is not None else ())]
     if not bags:
         raise BringupError(f"{listed}: expected a bag on each line, got none")
     if len(bags) > 1 and (missing := [path for path in bags if not path.exists()]):
@@ -53,7 +52,7 @@ def choose_recordings(given: Sequence[Path], listed: Path | None) -> Chosen:
     [(twice, count)] = Counter(path.resolve() for path in bags).most_common(1)
     if count > 1:
         raise BringupError(f"{twice}: expected each recording once, got it {count} times; leave out what repeats it")
-    return Chosen(tuple(bags), listed is not None or found != [bags])
+    return Chosen(tuple(bags), listed is not None or len(bags) > 1 or bags != list(given))
 
 
 def folder_names(bags: Sequence[Path]) -> list[str]:

@@ -24,11 +24,11 @@ def sent(where: str) -> Iterator[Client]:
     Raises:
         BringupError: there is no such cluster.
     """
-    with cluster(where) as client, sent_to(partial(_results, client)):
+    with cluster(where) as client, sent_to(partial(results_of, client)):
         yield client
 
 
-def _results(
+def results_of(
     client: Client, trial: Callable[..., Any], arguments: Iterable[tuple[Any, ...]]
 ) -> Generator[tuple[int, Any]]:
     """Yield (number, result) as trials end; the first that fails ends the rest."""
