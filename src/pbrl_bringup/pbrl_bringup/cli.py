@@ -18,7 +18,7 @@ from typer.exceptions import TyperException
 from pbrl_bringup.cli_errors import complain, complain_of
 from pbrl_bringup.cli_handing import hand_over
 from pbrl_bringup.cli_learning import diagnose, fit
-from pbrl_bringup.cli_measuring import bench, experiment
+from pbrl_bringup.cli_measuring import bench, cluster, experiment
 from pbrl_bringup.cli_options import (
     Bag,
     Diagnosis,
@@ -184,6 +184,11 @@ app.command(epilog="Example: ./pbrl bench wheel --quick")(bench)
 
 
 app.command(epilog="Example: ./pbrl experiment sample-efficiency --quick")(experiment)
+
+
+app.command(epilog="Example: ./pbrl cluster --workers 2, then ./pbrl fit runs --scheduler tcp://127.0.0.1:8786")(
+    cluster
+)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""The commands that measure: benches and the experiments of the thesis."""
+"""The commands that measure, benches and the experiments of the thesis, and the cluster that they can use."""
 
 from __future__ import annotations
 
@@ -59,3 +59,19 @@ def experiment(
 ) -> int:
     """Repeat an experiment of the thesis; figure.png in the folder, the last line is the report as JSON."""
     return hand_over("experiment", name=name, out=out, seed=seed, quick=quick, scheduler=scheduler)
+
+
+def cluster(
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Processes of one thread each. Default: one for each core.")
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address of this machine that the scheduler listens on; beware of open networks.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the scheduler; 0: any.")] = 8786,
+    join: Annotated[
+        str | None, typer.Option(help="No scheduler, but workers for one that runs: tcp://HOST:PORT.")
+    ] = None,
+) -> int:
+    """Keep a scheduler and workers for --scheduler of other commands, or add this machine's workers to one."""
+    return hand_over("cluster", workers=workers, host=host, port=port, join=join)

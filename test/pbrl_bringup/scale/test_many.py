@@ -50,7 +50,7 @@ def test_results_do_not_depend_on_the_number_of_workers(runs: Path, capsys: pyte
 
 def test_a_recording_that_cannot_be_read_costs_itself(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = runs.parent / "partly"
-    assert run_arguments(["fit", str(runs), "--out", str(out), "--scheduler", "local:2", *FEW]) == 2
+    assert run_arguments(["fit", str(runs), "--out", str(out), "--scheduler", "local:1", *FEW]) == 2
     error = capsys.readouterr().err.splitlines()[-1]
     assert error.startswith("pbrl: 1 of 4 recordings failed")
     assert "torn.bag" in error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import socket
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,31 +38,55 @@ def cluster(where: str) -> Iterator[Client]:
         BringupError: `where` is none of these; no scheduler or worker answers; a worker has other code or threads.
     """
     chosen = parse_scheduler(where)
-    with _quiet(), _started(chosen) if not chosen.address else _found(chosen) as client:
+    with _quiet(), _own(chosen) if not chosen.address else _found(chosen) as client:
         _check(client, chosen)
         yield client
 
 
 @contextmanager
-def _started(chosen: Scheduler) -> Iterator[Client]:
-    """Start a cluster that listens on this machine only; its workers are started again where they die."""
+def _own(chosen: Scheduler) -> Iterator[Client]:
+    with started(chosen.workers) as made, Client(made, set_as_default=False) as client:
+        yield client
+
+
+@contextmanager
+def started(workers: int, host: str = LOOPBACK, port: int = 0) -> Iterator[LocalCluster]:
+    """Start a cluster, whose workers are started again where they die; it ends with the block.
+
+    Args:
+        workers: processes of one thread each.
+        host: address of this machine on which it listens; whoever can reach it can run anything.
+        port: of the scheduler; 0: any.
+
+    Raises:
+        BringupError: it cannot listen there.
+    """
     # A nanny sets these before its worker starts, when nothing is loaded yet.
     alone = dict.fromkeys(THREADS, "1") | {"DASK_LOGGING__DISTRIBUTED": "critical"}
-    place = {"dashboard": False, "dashboard_address": f"{LOOPBACK}:0"}
+    place = {"dashboard": False, "dashboard_address": f"{host}:0"}
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        with socket.create_server((host, port), family=family):
+            pass  # Dask would leave half of a cluster behind where this fails
+    except OSError as error:
+        raise BringupError(
+            f"expected to listen on {host}, port {port or 'any'}, got: {error.strerror}; choose another --host, --port"
+        ) from error
     with (
+        _quiet(),
         LocalCluster(
-            n_workers=chosen.workers,
+            n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            host=LOOPBACK,
+            host=host,
+            scheduler_port=port,
             dashboard_address=None,
             scheduler_kwargs=place,
             silence_logs=logging.CRITICAL,
             env=alone,
         ) as made,
-        Client(made, set_as_default=False) as client,
     ):
-        yield client
+        yield made
 
 
 @contextmanager
