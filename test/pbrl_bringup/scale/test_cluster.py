@@ -15,6 +15,7 @@ from scale_kit import square
 from pbrl_bringup.cli import run_arguments
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.scale import cluster as clusters
+from pbrl_bringup.scale import pieces
 from pbrl_bringup.scale.address import Scheduler, parse_scheduler
 from pbrl_bringup.scale.cluster import cluster
 from pbrl_bringup.scale.pieces import run_pieces
@@ -95,6 +96,13 @@ def test_workers_with_other_code_are_refused(here: LocalCluster, monkeypatch: py
     monkeypatch.setattr(clusters, "code_of", lambda: "another checksum")
     with pytest.raises(BringupError, match="expected the same code"), cluster(here.scheduler_address):
         pass
+
+
+def test_a_worker_that_comes_later_is_looked_at_too(here: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
+    with cluster(here.scheduler_address) as client:
+        monkeypatch.setattr(pieces, "code_of", lambda: "another checksum")
+        with pytest.raises(BringupError, match="expected the same code"):
+            list(run_pieces(client, square, [(3,)]))
 
 
 @pytest.mark.parametrize("here", [(0, 1)], indirect=True)

@@ -122,7 +122,8 @@ def results(client: Client, jobs: list[tuple[Any, ...]]) -> Iterator[str]:
 def with_a_worker_killed(client: Client, jobs: list[tuple[Any, ...]], runs: Path) -> tuple[list[str], int]:
     """Fit all, and kill a worker at its fit when the first is done; return results and how many fits were begun."""
     runs.unlink()
-    processes, found = process_ids(client), []
+    processes = process_ids(client)
+    found: list[str] = []
     for answer in results(client, jobs):
         if not found:
             busy = next(worker for worker, pieces in client.processing().items() if pieces)

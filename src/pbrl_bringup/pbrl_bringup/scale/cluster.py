@@ -18,6 +18,7 @@ from pbrl_bringup.errors import BringupError
 from pbrl_bringup.parallel import THREADS
 from pbrl_bringup.scale.address import Scheduler, parse_scheduler
 from pbrl_bringup.scale.worker import OneOfOurs, WrongWorkerError, code_of
+from pbrl_bringup.terminal import say
 
 ANSWER = 5.0
 """So long [s] a scheduler has to answer."""
@@ -123,6 +124,8 @@ def _check(client: Client, chosen: Scheduler) -> None:
         BringupError: none comes, or one is not.
     """
     named = f"--scheduler {chosen.address or 'local'}"
+    if not client.nthreads():
+        say(f"pbrl: {named} has no worker yet; one is waited for, {FIRST_WORKER:g} s at most")
     try:
         client.wait_for_workers(1, timeout=FIRST_WORKER)
     except TimeoutError as error:

@@ -14,7 +14,7 @@ from distributed import Client, Future, KilledWorker, wait
 from distributed.comm.core import CommClosedError
 
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.scale.worker import run_piece
+from pbrl_bringup.scale.worker import WrongWorkerError, code_of, run_piece
 
 Result = TypeVar("Result")
 
@@ -70,7 +70,7 @@ def run_pieces(
         What became of each piece, in the order in which they end.
 
     Raises:
-        BringupError: the scheduler is gone, or all workers are for a minute.
+        BringupError: the scheduler is gone, or all workers are for a minute, or one came that has other code.
     """
     run, numbered = uuid.uuid4().hex[:12], enumerate(arguments)
     waiting: dict[Future, tuple[int, tuple[Any, ...]]] = {}
@@ -80,7 +80,7 @@ def run_pieces(
             for index, each in itertools.islice(numbered, max(0, free)):
                 # One piece a worker: a piece that kills its worker then never takes another piece with it.
                 key = f"{getattr(trial, '__name__', 'piece')}-{run}-{index}"
-                waiting[client.submit(run_piece, trial, each, key=key, pure=False)] = (index, each)
+                waiting[client.submit(run_piece, trial, each, code_of(), key=key, pure=False)] = (index, each)
             if not waiting:
                 return
             for future in _some_done(client, list(waiting)):
@@ -105,6 +105,8 @@ def _outcome(client: Client, future: Future, index: int, arguments: tuple[Any, .
                 "it; it may need more memory than a worker has: give workers more, or run it alone"
             ),
         )
+    except WrongWorkerError as error:
+        raise BringupError(str(error)) from error
     except (CancelledError, CommClosedError, TimeoutError) as error:
         if future.cancelled() or client.status != "running":
             raise _gone(client) from error

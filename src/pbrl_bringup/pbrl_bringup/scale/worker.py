@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import dask
-from distributed import Worker, WorkerPlugin
+from distributed import Worker, WorkerPlugin, get_worker
 
 from pbrl_bringup.parallel import THREADS
 
@@ -46,25 +46,45 @@ class OneOfOurs(WorkerPlugin):
         Raises:
             WrongWorkerError: it has several threads, or other code.
         """
-        if worker.state.nthreads != 1:
-            raise WrongWorkerError(
-                f"worker {worker.address}: expected one thread, got {worker.state.nthreads}; compiled code is not "
-                "shared by threads: start it with --nthreads 1 and as many --nworkers as there are cores"
-            )
-        if code_of() != self.code:
-            raise WrongWorkerError(
-                f"worker {worker.address}: expected the same code as here, got another version; update it there"
-            )
+        check_worker(worker, self.code)
         os.environ.update(dict.fromkeys(THREADS, "1"))  # before numba is loaded, which reads it once
 
 
-def run_piece(trial: Callable[..., Result], arguments: tuple[Any, ...]) -> Result:
+def check_worker(worker: Worker, code: str) -> None:
+    """See that a worker gives the results that the client's own process would.
+
+    Args:
+        worker: the worker.
+        code: what `code_of` says where the client is.
+
+    Raises:
+        WrongWorkerError: it has several threads, or other code.
+    """
+    if worker.state.nthreads != 1:
+        raise WrongWorkerError(
+            f"worker {worker.address}: expected one thread, got {worker.state.nthreads}; compiled code is not "
+            "shared by threads: start it with --nthreads 1 and as many --nworkers as there are cores"
+        )
+    if code_of() != code:
+        raise WrongWorkerError(
+            f"worker {worker.address}: expected the same code as here, got another version; update it there, and "
+            "start the worker anew"
+        )
+
+
+def run_piece(trial: Callable[..., Result], arguments: tuple[Any, ...], code: str) -> Result:
     """Run one piece of work.
 
     Args:
         trial: what to run.
         arguments: of it.
+        code: what `code_of` says where the client is.
+
+    Raises:
+        WrongWorkerError: the worker, which may have come only now, is none of ours.
+        Exception: what the trial raises.
     """
+    check_worker(get_worker(), code)
     if "numba" in sys.modules:  # it may have been loaded before the set-up
         sys.modules["numba"].set_num_threads(1)
     # A piece brings no work of its own to the cluster; xarray would ask it for a lock of every file.
@@ -74,7 +94,10 @@ def run_piece(trial: Callable[..., Result], arguments: tuple[Any, ...]) -> Resul
 
 @cache
 def code_of() -> str:
-    """Return a checksum of the workspace's Python files: the same code gives the same results."""
+    """Return a checksum of the workspace's Python files when it was first asked for: the same gives the same results.
+
+    A process that stays has what it once loaded, whatever has become of the files since.
+    """
     seen = hashlib.sha256()
     for package in PACKAGES:
         found = find_spec(package)
