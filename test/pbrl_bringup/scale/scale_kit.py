@@ -48,5 +48,6 @@ def surroundings() -> dict[str, object]:
         "threads": numba.get_num_threads(),
         "most": numba.config.NUMBA_NUM_THREADS,  # type: ignore[attr-defined]
         "blas": os.environ.get("OPENBLAS_NUM_THREADS"),
+        "deaf": signal.getsignal(signal.SIGINT) == signal.SIG_IGN,
         "cache": os.environ.get("NUMBA_CACHE_DIR"),
     }

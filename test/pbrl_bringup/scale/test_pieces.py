@@ -91,6 +91,7 @@ def test_what_runs_in_parallel_is_the_same_on_a_cluster(two_workers: Client) -> 
 
 def test_workers_have_one_thread_and_share_compiled_code(two_workers: Client) -> None:
     ended = [each for each in run_pieces(two_workers, surroundings, [()] * 4) if isinstance(each, Done)]
+    assert all(each.result["deaf"] for each in ended), "Ctrl-C is for the command"
     assert {each.result["pid"] for each in ended} <= set(process_ids(two_workers).values())
     told = {(each.result["threads"], each.result["most"], each.result["blas"], each.result["cache"]) for each in ended}
     assert told == {(1, 1, "1", os.environ.get("NUMBA_CACHE_DIR"))}

@@ -25,6 +25,7 @@ ANSWER = 5.0
 FIRST_WORKER = 60.0
 """So long [s] is waited for a first worker."""
 LOOPBACK = "127.0.0.1"
+DEAF = "pbrl_bringup.scale.deaf"
 LOGGERS = ("distributed", "tornado", "asyncio")
 
 
@@ -85,6 +86,7 @@ def started(workers: int, host: str = LOOPBACK, port: int = 0) -> Iterator[Local
             scheduler_kwargs=place,
             silence_logs=logging.CRITICAL,
             env=alone,
+            preload=[DEAF],
         ) as made,
     ):
         yield made
