@@ -13,7 +13,9 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["typer", "rich", "jinja2", "psutil", "pydantic", "numpy", "starlette", "uvicorn"],
+    install_requires=[
+        *("typer", "rich", "jinja2", "psutil", "pydantic", "numpy", "starlette", "uvicorn", "dask", "distributed"),
+    ],
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -209,3 +209,19 @@ def write_bag(folder: Path, edit: Edit = lambda topic, index, message: message) 
 def make_bag(tmp_path: Path) -> Callable[..., Path]:
     """Write the recording, edited, into a folder of this test."""
     return lambda edit=lambda topic, index, message: message: write_bag(tmp_path / "bag", edit)
+
+
+@pytest.fixture(scope="session")
+def write_push() -> Callable[..., Path]:
+    """Write the recording into a folder, where what the gripper feels along x is another force [N]."""
+
+    def written(folder: Path, force: float) -> Path:
+        def edit(topic: str, index: int, message: Any) -> Any:
+            if topic.startswith("/wrist_ft") and message.wrench.force.x:
+                message.wrench.force.x = force
+            return message
+
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        return write_bag(folder, edit)
+
+    return written

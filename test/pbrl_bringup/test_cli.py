@@ -16,7 +16,7 @@ from pbrl_bringup.cli import app, run_arguments
 MakeBag = Callable[..., Path]
 NAMED = [
     *("demo", "test", "fit", "diagnose", "simulate", "run", "record", "play", "info", "map"),
-    *("view", "export", "bench", "experiment"),
+    *("view", "export", "bench", "experiment", "cluster"),
 ]
 COMMANDS = sorted(command.name or command.callback.__name__ for command in app.registered_commands if command.callback)
 
@@ -157,7 +157,7 @@ def test_a_fault_of_ours_is_one_line_too(capsys: pytest.CaptureFixture[str], mon
     def broken(name: str) -> None:
         raise TypeError("two\nlines")
 
-    monkeypatch.setattr("pbrl_bringup.cli.import_module", broken)
+    monkeypatch.setattr("pbrl_bringup.cli_handing.import_module", broken)
     monkeypatch.delenv("PBRL_TRACEBACK", raising=False)
     assert run_arguments(["info", "bag"]) == 1
     error = capsys.readouterr().err

@@ -8,23 +8,22 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
 
 from pbrl_bringup.cli_errors import complain, complain_of
+from pbrl_bringup.cli_handing import hand_over
+from pbrl_bringup.cli_learning import diagnose, fit
+from pbrl_bringup.cli_measuring import bench, cluster, experiment
 from pbrl_bringup.cli_options import (
     Bag,
     Diagnosis,
     Domain,
-    Draws,
-    Engine,
     Form,
-    Likelihood,
     Many,
     Mapping,
     Models,
@@ -32,8 +31,6 @@ from pbrl_bringup.cli_options import (
     Opened,
     Out,
     Port,
-    Quick,
-    Sampler,
     Seed,
 )
 
@@ -49,11 +46,6 @@ app = typer.Typer(
 )
 
 
-def _hand_over(command: str, **arguments: Any) -> int:
-    """Run `pbrl_bringup.commands.<command>.command`, imported only now: what it needs may be heavy."""
-    return int(import_module(f"pbrl_bringup.commands.{command}").command(**arguments))
-
-
 @app.command(epilog="Example: ./pbrl demo --seed 3 --out out/demo")
 def demo(
     out: Out = Path("out/demo"),
@@ -63,106 +55,19 @@ def demo(
     ] = None,
 ) -> int:
     """Push a table with a locked caster, learn from the recording, show it on a page."""
-    return _hand_over("demo", out=out, seed=seed, gui=gui)
+    return hand_over("demo", out=out, seed=seed, gui=gui)
 
 
 @app.command(context_settings=Many, epilog="Example: ./pbrl test -- -k kernel -x")
 def test(context: typer.Context) -> int:
     """Check style and types, then run every test; further arguments go to pytest."""
-    return _hand_over("test", arguments=context.args)
+    return hand_over("test", arguments=context.args)
 
 
-@app.command(epilog="Example: ./pbrl fit out/demo/bag --out out/fit")
-def fit(
-    bag: Bag,
-    mapping: Mapping = None,
-    out: Out = Path("out/fit"),
-    model_class: Annotated[
-        str,
-        typer.Option(
-            help="free, wheel, wheel+ground or hinge; auto: hinge where only a point of the body was seen, "
-            "else wheel+ground (a wheel, and friction of the whole body on the floor)."
-        ),
-    ] = "auto",
-    likelihood: Annotated[Likelihood, typer.Option(help="How motion is compared.")] = Likelihood.WINDOWED,
-    sampler: Annotated[
-        Sampler,
-        typer.Option(help="importance: every mode, with an evidence; metropolis: block-wise chains, the thesis's way."),
-    ] = Sampler.IMPORTANCE,
-    engine: Annotated[
-        Engine, typer.Option(help="What simulates: the compiled kernel, or pymunk, the thesis's way and far slower.")
-    ] = Engine.KERNEL,
-    draws: Draws = None,
-    priors: Annotated[
-        Path | None, typer.Option(help="YAML file of priors, as config/params/priors.yaml. Default: what stands there.")
-    ] = None,
-    seed: Seed = 0,
-) -> int:
-    """Learn the physics of every object that was pushed in a recording."""
-    return _hand_over(
-        "fit",
-        bag=bag,
-        mapping=mapping,
-        out=out,
-        model_class=model_class,
-        likelihood=str(likelihood),
-        sampler=str(sampler),
-        engine=str(engine),
-        draws=draws,
-        priors=priors,
-        seed=seed,
-    )
+app.command(epilog="Example: ./pbrl fit out/demo/bag --out out/fit")(fit)
 
 
-@app.command(epilog="Example: ./pbrl diagnose out/demo/bag --baseline wheel+ground --out out/diagnose")
-def diagnose(
-    bag: Bag,
-    mapping: Mapping = None,
-    out: Out = Path("out/diagnose"),
-    baseline: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="What is no mismatch: free, caster (one that is locked), wheel, ground, wheel+ground or hinge; as "
-            "often as needed, the best counts. Default: free, caster and wheel."
-        ),
-    ] = None,
-    without: Annotated[
-        list[str] | None, typer.Option(help="An effect that the library does without, as often as needed.")
-    ] = None,
-    effects: Annotated[
-        list[Path] | None,
-        typer.Option(help="Python file that adds effects of one's own (docs/mismatch.md), as often as needed."),
-    ] = None,
-    mass_spread: Annotated[
-        float | None,
-        typer.Option(help="How well the mass that was told is known: 0.2 is to 20 %. Default: 0.1."),
-    ] = None,
-    grasp_spread: Annotated[
-        float | None,
-        typer.Option(help="How well the gripper's direction is known [rad]. Default: 0, exactly."),
-    ] = None,
-    outline_spread: Annotated[
-        float | None,
-        typer.Option(help="How well each side of the outline is known [m]. Default: 0, exactly."),
-    ] = None,
-    seed: Seed = 0,
-    workers: Annotated[
-        int, typer.Option(min=1, max=256, help="Threads; the result does not depend on their number.")
-    ] = 2,
-) -> int:
-    """Say where recording and model part, what physics was left out, and show that the repair predicts better."""
-    return _hand_over(
-        "diagnose",
-        bag=bag,
-        mapping=mapping,
-        out=out,
-        baseline=baseline or [],
-        without=without or [],
-        effects=effects or [],
-        known={"mass_spread": mass_spread, "grasp_spread": grasp_spread, "outline_spread": outline_spread},
-        seed=seed,
-        workers=workers,
-    )
+app.command(epilog="Example: ./pbrl diagnose out/demo/bag --baseline wheel+ground --out out/diagnose")(diagnose)
 
 
 @app.command(epilog="Example: ./pbrl simulate locked_caster --push turn_table --seed 2 --out out/push")
@@ -174,7 +79,7 @@ def simulate(
     gui: Annotated[bool, typer.Option("--gui", help="Open Bullet's window.")] = False,
 ) -> int:
     """Simulate a push and record it, faster than real time, without ROS processes."""
-    return _hand_over("simulate", scene=scene, push=push, seed=seed, out=out, gui=gui)
+    return hand_over("simulate", scene=scene, push=push, seed=seed, out=out, gui=gui)
 
 
 @app.command(epilog="Example: ./pbrl run krang_push --set sim.scene=three_tables --with recorder")
@@ -188,7 +93,7 @@ def run(
 ) -> int:
     """Start a graph of nodes and keep it until Ctrl-C."""
     chosen = {"settings": set_ or [], "optional": with_ or [], "namespace": namespace}
-    return _hand_over("run", graph=graph, **chosen, domain=domain, logs=logs)
+    return hand_over("run", graph=graph, **chosen, domain=domain, logs=logs)
 
 
 @app.command(epilog="Example: ./pbrl record --out out/push.bag")
@@ -199,7 +104,7 @@ def record(
     domain: Domain = None,
 ) -> int:
     """Record the topics of a running graph or robot."""
-    return _hand_over("record", out=out, duration=duration, namespace=namespace, domain=domain)
+    return hand_over("record", out=out, duration=duration, namespace=namespace, domain=domain)
 
 
 @app.command(epilog="Example: ./pbrl play out/push.bag --rate 2")
@@ -210,13 +115,13 @@ def play(
     domain: Domain = None,
 ) -> int:
     """Publish a recording again."""
-    return _hand_over("play", bag=bag, rate=rate, namespace=namespace, domain=domain)
+    return hand_over("play", bag=bag, rate=rate, namespace=namespace, domain=domain)
 
 
 @app.command(epilog="Example: ./pbrl info out/push.bag")
 def info(bag: Bag, mapping: Mapping = None) -> int:
     """Say what a recording holds: topics, rates, objects, grasps."""
-    return _hand_over("info", bag=bag, mapping=mapping)
+    return hand_over("info", bag=bag, mapping=mapping)
 
 
 @app.command(epilog="Example: ./pbrl view out/demo/bag --model out/fit/posterior_table_a.nc")
@@ -233,7 +138,7 @@ def view(
     domain: Domain = None,
 ) -> int:
     """Show a recording or a running graph on a page of this machine: top view, forces, models, time."""
-    return _hand_over(
+    return hand_over(
         "view",
         what=what,
         mapping=mapping,
@@ -256,7 +161,7 @@ def map_bag(
     ] = None,
 ) -> int:
     """Propose which stream of a foreign bag plays which role, with reasons, as a mapping file."""
-    return _hand_over("map", bag=bag, out=out, sizes=size or [])
+    return hand_over("map", bag=bag, out=out, sizes=size or [])
 
 
 @app.command(epilog="Example: ./pbrl export out/fit --format urdf --out out/table.urdf")
@@ -272,56 +177,18 @@ def export(
     only: Annotated[str | None, typer.Option("--object", help="Which one, where a folder has several.")] = None,
 ) -> int:
     """Write a learned object in the words of other stacks: inertia, friction, and how sure they are."""
-    return _hand_over("export", model=model, form=str(form), out=out, height=height, only=only)
+    return hand_over("export", model=model, form=str(form), out=out, height=height, only=only)
 
 
-@app.command(epilog="Example: ./pbrl bench wheel --quick")
-def bench(
-    name: Annotated[
-        str,
-        typer.Argument(
-            help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose, calibration, concealed, "
-            "tags, control, next-experiment, view or mismatch."
-        ),
-    ],
-    out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,
-    seed: Seed = 0,
-    quick: Quick = False,
-    sets: Annotated[
-        str | None,
-        typer.Option(
-            help="Sets of cases of the bench concealed, with commas: clean, single, pairs, withheld, furnished, rough. "
-            "Default: all."
-        ),
-    ] = None,
-    most: Annotated[
-        int | None, typer.Option(min=1, help="Recordings an effect at most, and ten times as many clean ones.")
-    ] = None,
-    minutes: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="After which no recording is begun; what there is is reported, and goes on later."),
-    ] = None,
-) -> int:
-    """Measure one group of acceptance rows; the last line is the report as JSON."""
-    wanted = [each.strip() for each in sets.split(",")] if sets is not None else []
-    return _hand_over("bench", name=name, out=out, seed=seed, quick=quick, sets=wanted, most=most, minutes=minutes)
+app.command(epilog="Example: ./pbrl bench wheel --quick")(bench)
 
 
-@app.command(epilog="Example: ./pbrl experiment sample-efficiency --quick")
-def experiment(
-    name: Annotated[
-        str,
-        typer.Argument(
-            help="shopping-cart, shopping-cart-noisy, apartment, sample-efficiency, noise, robot-fits, limits or "
-            "contact."
-        ),
-    ],
-    out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/experiment/NAME.")] = None,
-    seed: Seed = 0,
-    quick: Quick = False,
-) -> int:
-    """Repeat an experiment of the thesis; figure.png in the folder, the last line is the report as JSON."""
-    return _hand_over("experiment", name=name, out=out, seed=seed, quick=quick)
+app.command(epilog="Example: ./pbrl experiment sample-efficiency --quick")(experiment)
+
+
+app.command(epilog="Example: ./pbrl cluster --workers 2, then ./pbrl fit runs --scheduler tcp://127.0.0.1:8786")(
+    cluster
+)
 
 
 def main() -> None:

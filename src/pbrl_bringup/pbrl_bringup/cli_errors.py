@@ -29,9 +29,12 @@ def complain(message: str, code: int) -> int:
 
 def complain_of(error: Exception) -> int:
     """Say what is wrong, and return 2 for something that the person can mend, 1 for a fault of ours."""
-    if _is_for_the_user(error):
-        return complain(" ".join(str(error).split()), 2)
-    return complain(_fault(error), 1)
+    return complain(told_of(error), 2 if _is_for_the_user(error) else 1)
+
+
+def told_of(error: Exception) -> str:
+    """Return what a person is told of an error, in a line."""
+    return " ".join(str(error).split()) if _is_for_the_user(error) else _fault(error)
 
 
 def _is_for_the_user(error: Exception) -> bool:

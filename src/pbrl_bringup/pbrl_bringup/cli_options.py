@@ -43,6 +43,22 @@ class Form(StrEnum):
 Seed = Annotated[int, typer.Option(min=0, help="Seed of every random draw; the same seed gives the same result.")]
 Out = Annotated[Path, typer.Option(help="Folder for the results.")]
 Bag = Annotated[Path, typer.Argument(help="Bag folder, .mcap, .db3 or .bag file, or .csv with --map.")]
+Bags = Annotated[
+    list[Path] | None,
+    typer.Argument(
+        metavar="BAG",
+        help="Bag folder, .mcap, .db3 or .bag file, or .csv with --map. Several, a folder with bags below it or a "
+        "pattern: one folder of results each, and a summary.",
+    ),
+]
+Listed = Annotated[Path | None, typer.Option("--list", help="Text file with a bag on each line, beside or instead.")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        help="Where the work is shared out (docs/scale.md): local, local:WORKERS, or a Dask scheduler of your own, "
+        "tcp://HOST:PORT. Results do not depend on it. Default: this machine's cores."
+    ),
+]
 Mapping = Annotated[
     Path | None, typer.Option("--map", help="Which topic or column plays which role in a foreign file.")
 ]

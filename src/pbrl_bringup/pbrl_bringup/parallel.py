@@ -1,13 +1,17 @@
-"""Independent trials in processes of their own, each on one core; the same results whatever the number of cores."""
+"""Independent trials in processes of their own, each on one core; the same results whatever the number of cores.
+
+By default the processes are a pool on this machine; inside of `sent_to` they are whatever that names.
+"""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from contextvars import ContextVar
 from multiprocessing import active_children, get_context, parent_process
 from types import FrameType
 from typing import Any, TypeVar
@@ -21,9 +25,23 @@ UNWINDING = 2.0
 """So long [s] a process has for what it began, once it is told to end."""
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
+Elsewhere = Callable[[Callable[..., Any], Iterable[tuple[Any, ...]]], Generator[tuple[int, Any]]]
+"""Runs a trial for each tuple of arguments somewhere: yields (number, result) as they end, raises what one raised."""
+_ELSEWHERE: ContextVar[Elsewhere | None] = ContextVar("elsewhere", default=None)
+
+
+@contextmanager
+def sent_to(elsewhere: Elsewhere) -> Iterator[None]:
+    """Have `in_parallel` run its trials elsewhere than in a pool of this machine, inside the block."""
+    token = _ELSEWHERE.set(elsewhere)
+    try:
+        yield
+    finally:
+        _ELSEWHERE.reset(token)
+
 
 def in_parallel(trial: Callable[..., Result], arguments: Sequence[tuple[Any, ...]], what: str) -> list[Result]:
-    """Run a trial for each tuple of arguments and return the results in their order.
+    """Run a trial for each tuple of arguments, here or where `sent_to` says, and return the results in their order.
 
     Args:
         trial: a function of a module, so that another process can find it.
@@ -33,7 +51,14 @@ def in_parallel(trial: Callable[..., Result], arguments: Sequence[tuple[Any, ...
     Raises:
         Exception: whatever the first failing trial raised; the others are given up.
     """
+    elsewhere = _ELSEWHERE.get()
     results: dict[int, Result] = {}
+    if elsewhere is not None:
+        with progress(what, len(arguments)) as bar, closing(elsewhere(trial, arguments)) as ended:
+            for index, result in ended:
+                results[index] = result
+                bar(len(results))
+        return [results[index] for index in range(len(arguments))]
     with (
         _one_thread_each(),
         ProcessPoolExecutor(

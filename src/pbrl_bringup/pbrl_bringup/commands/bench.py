@@ -30,6 +30,7 @@ BENCHES = {
     "two-robots": "two robots in one ROS domain, each in a namespace: both move a table out of the way and arrive",
     "view": "the viewer on ten minutes of five objects: first picture, pictures a second, console",
     "mismatch": "the watch over a stream: half an hour of clean pushing without an alarm, and how late alarms are",
+    "scale": "many recordings on a Dask cluster: two workers against one, a worker killed, a thousand queued",
 }
 
 WITH_SETS = ("concealed",)
@@ -44,6 +45,7 @@ def command(
     sets: list[str],
     most: int | None,
     minutes: float | None = None,
+    scheduler: str | None = None,
 ) -> int:
     """Run one bench.
 
@@ -55,9 +57,11 @@ def command(
         sets: which sets of cases, for a bench that has some; none: all.
         most: recordings an effect at most, for a bench that has sets; None: all.
         minutes: after which a bench that has sets begins no recording; None: it does all.
+        scheduler: where its independent parts are done; None: in processes of this machine.
 
     Raises:
-        BringupError: there is no bench of that name, it has no sets, or none of such a name.
+        BringupError: there is no bench of that name, it has no sets, or none of such a name, or there is no such
+            scheduler.
     """
     if sets and name in BENCHES and name not in WITH_SETS:
         raise BringupError(f"bench {name}: expected no --sets, got {', '.join(sets)}; {', '.join(WITH_SETS)} has some")
@@ -69,7 +73,9 @@ def command(
         raise BringupError(
             f"bench {name}: expected no --minutes, got {minutes:g}; {', '.join(WITH_SETS)} can go on later"
         )
+    if scheduler is not None and name == "scale":
+        raise BringupError(f"bench scale: expected no --scheduler, got {scheduler}; it compares clusters of its own")
     more: dict[str, Any] = {"sets": sets} if sets else {}
     more |= {} if most is None else {"most": most}
     more |= {} if minutes is None else {"minutes": minutes}
-    return run_measured("bench", BENCHES, name, out, seed, quick, more)
+    return run_measured("bench", BENCHES, name, out, seed, quick, more, scheduler)

@@ -33,10 +33,10 @@ EXPERIMENTS = {
 }
 
 
-def command(name: str, out: Path | None, seed: int, quick: bool) -> int:
+def command(name: str, out: Path | None, seed: int, quick: bool, scheduler: str | None = None) -> int:
     """Run one experiment.
 
     Raises:
-        BringupError: there is none of that name.
+        BringupError: there is none of that name, or no such scheduler.
     """
-    return run_measured("experiment", EXPERIMENTS, name, out, seed, quick)
+    return run_measured("experiment", EXPERIMENTS, name, out, seed, quick, scheduler=scheduler)

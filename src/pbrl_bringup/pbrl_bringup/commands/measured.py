@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -23,6 +24,7 @@ def run_measured(
     seed: int,
     quick: bool,
     more: Mapping[str, Any] | None = None,
+    scheduler: str | None = None,
 ) -> int:
     """Run the module `pbrl_bringup.<kind>s.<name>`.
 
@@ -34,25 +36,35 @@ def run_measured(
         seed: of every random draw.
         quick: whether to do a smaller version.
         more: what only this one can be asked, by name.
+        scheduler: where its independent parts are done, as `--scheduler` has it; None: in processes of this machine.
 
     Raises:
-        BringupError: there is none of that name.
+        BringupError: there is none of that name, or no such scheduler.
     """
     if name not in known:
         near = difflib.get_close_matches(name, known, 1)
         advice = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
         raise BringupError(f"{kind} {name!r} is not known; {advice}")
     folder = out or Path("out") / kind / name
+    if scheduler is not None:
+        folder = folder.absolute()  # workers elsewhere have another working directory
     output_folder(folder)
     say(f"pbrl: {kind} {name}: {known[name]}; seed {seed}, results in {folder}")
     module = import_module(f"pbrl_bringup.{PACKAGES[kind]}.{name.replace('-', '_')}")
-    summary = report(name, seed, partial(module.measure, **(more or {})), quick, folder)
+    with _sent(scheduler):
+        summary = report(name, seed, partial(module.measure, **(more or {})), quick, folder)
     rows = [
         (row["what"], _value(row["value"]), row["unit"], row["goal"], _mark(row["holds"])) for row in summary["rows"]
     ]
     output().print(table(f"{kind} {name}", ("what", "value", "unit", "goal", "holds"), rows, right=(1,)))
     print(last_line(summary))
     return 0
+
+
+def _sent(scheduler: str | None) -> AbstractContextManager[object]:
+    """Have independent parts done on a cluster inside the block, where one is named."""
+    # Dask is slow to load, and only this needs it.
+    return nullcontext() if scheduler is None else import_module("pbrl_bringup.scale.sending").sent(scheduler)
 
 
 PACKAGES = {"bench": "benches", "experiment": "experiments"}

@@ -52,11 +52,16 @@ def run_doors(recording: Recording, options: DiagnoseOptions, out: Path, asked_f
     with result_folder(out) as folder:
         with Console(stderr=True).status(f"diagnosing (baseline hinge, force along the path, seed {options.seed})"):
             found = diagnose_doors(recording, options)
-        write_json(folder / "report.json", found.to_report())
-        write_text(folder / "report.html", render_doors(found, asked_for))
+        write_doors(found, folder, asked_for)
     print_doors(found)
     output().print(f"[bold]{out / 'report.html'}[/]")
     return 0
+
+
+def write_doors(found: DoorsDiagnosis, folder: Path, asked_for: str) -> None:
+    """Write the report and the page."""
+    write_json(folder / "report.json", found.to_report())
+    write_text(folder / "report.html", render_doors(found, asked_for))
 
 
 def render_doors(diagnosis: DoorsDiagnosis, command: str) -> str:
