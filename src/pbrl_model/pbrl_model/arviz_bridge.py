@@ -113,7 +113,8 @@ def _write(data: Any, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         data.to_netcdf(str(unfinished))
         unfinished.replace(path)
-    except OSError as error:
+    except (OSError, ValueError) as error:  # netCDF has no text with a zero in it
+        unfinished.unlink(missing_ok=True)
         raise ModelError(f"{path}: expected to write a posterior there, got {' '.join(str(error).split())}") from None
 
 
@@ -133,7 +134,14 @@ def load_posterior(path: Path) -> Posterior:
             raise ModelError(f"{path}: {error}") from None
     try:
         data = az().from_netcdf(str(path))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        RuntimeError,
+    ) as error:  # HDF5 fails in any way
         raise ModelError(f"{path}: expected netCDF, got {' '.join(str(error).split())}") from None
     try:
         return from_inference_data(data)

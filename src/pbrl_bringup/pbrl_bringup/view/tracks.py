@@ -92,12 +92,18 @@ def force_track(stream: WrenchStream, gripper: PoseStream | None, origin: float)
     """
     force = stream.force
     if stream.frame == "sensor":
-        if gripper is None or not np.isfinite(gripper.quaternion).all():
+        if gripper is None or not len(gripper.time) or not _turns(gripper.quaternion):
             return None
         nearest = np.clip(np.searchsorted(gripper.time, stream.time), 0, len(gripper.time) - 1)
         force = Rotation.from_quat(gripper.quaternion[nearest]).apply(force.copy())
     sign = -1.0 if stream.exerted_on == "gripper" else 1.0
     return BandTrack(stream.time - origin, sign * force[:, :2])
+
+
+def _turns(quaternion: Array) -> bool:
+    """Tell whether rows (n, 4) are orientations, of whatever length a driver has left them."""
+    length = np.linalg.norm(quaternion, axis=1)
+    return bool(np.isfinite(length).all() and (length > 0.0).all())
 
 
 def listed(values: Array, digits: int) -> list[float | None]:
