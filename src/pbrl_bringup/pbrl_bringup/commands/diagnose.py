@@ -16,7 +16,7 @@ from pbrl_bringup.diagnosis.models import write_models
 from pbrl_bringup.diagnosis.page import write_diagnosis
 from pbrl_bringup.diagnosis.residuals import RESIDUALS, residuals_to_json
 from pbrl_bringup.files import result_folder, write_json
-from pbrl_bringup.terminal import output, say, table
+from pbrl_bringup.terminal import output, say, styled, table
 from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis, diagnose
 from pbrl_mismatch.effects.own_file import load_effects
 from pbrl_mismatch.joint.diagnosis import is_for_doors
@@ -78,7 +78,7 @@ def command(
         models = write_models(found, folder, seed)
         write_diagnosis(found, recording, asked_for, folder / "report.html", options=options, models=models)
     print_diagnosis(found)
-    output().print(f"[bold]{out / 'report.html'}[/]")
+    output().print(styled(str(out / "report.html"), "bold"))
     return 0
 
 

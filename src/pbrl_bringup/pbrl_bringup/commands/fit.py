@@ -16,7 +16,7 @@ from pbrl_bringup.replay import replay
 from pbrl_bringup.report_build import object_report, whole_report
 from pbrl_bringup.report_data import Report
 from pbrl_bringup.report_page import number, rounded, write_page
-from pbrl_bringup.terminal import output, say, table
+from pbrl_bringup.terminal import output, say, styled, table
 from pbrl_model.arviz_bridge import save_posterior
 from pbrl_model.fitted_model import fitted_model
 from pbrl_model.fitting.fit import Fit, FitOptions, fit_recording
@@ -62,7 +62,7 @@ def command(
         write_json(folder / "report.json", fit.to_report())
         write_page(report, folder / "report.html")
     print_fit(fit, report)
-    output().print(f"[bold]{out / 'report.html'}[/]")
+    output().print(styled(str(out / "report.html"), "bold"))
     return 0
 
 
