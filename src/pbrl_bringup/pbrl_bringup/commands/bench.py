@@ -28,11 +28,14 @@ BENCHES = {
     "foreign": "a push as five other laboratories would have recorded it: roles proposed, fitted like the native one",
     "played-again": "what is learned live, and from the recording of it played again: number for number",
     "view": "the viewer on ten minutes of five objects: first picture, pictures a second, console",
+    "fuzz": "hostile files and messages by the thousand: each is read, or refused in one line",
     "mismatch": "the watch over a stream: half an hour of clean pushing without an alarm, and how late alarms are",
 }
 
-WITH_SETS = ("concealed",)
-"""Benches whose cases come in sets."""
+WITH_SETS = ("concealed", "fuzz")
+"""Benches whose cases come in sets, and can be counted."""
+WITH_MINUTES = ("concealed", "fuzz")
+"""Benches that can end after a time."""
 
 
 def command(
@@ -52,21 +55,23 @@ def command(
         seed: of every random draw.
         quick: whether to do a smaller version.
         sets: which sets of cases, for a bench that has some; none: all.
-        most: recordings an effect at most, for a bench that has sets; None: all.
-        minutes: after which a bench that has sets begins no recording; None: it does all.
+        most: recordings an effect at most, or hostile inputs in all, for a bench that has sets; None: all.
+        minutes: after which such a bench begins no recording, or gives no further input; None: it does all.
 
     Raises:
-        BringupError: there is no bench of that name, it has no sets, or none of such a name.
+        BringupError: there is no bench of that name, it has no such option, or no set of such a name.
     """
     if sets and name in BENCHES and name not in WITH_SETS:
-        raise BringupError(f"bench {name}: expected no --sets, got {', '.join(sets)}; {', '.join(WITH_SETS)} has some")
+        raise BringupError(
+            f"bench {name}: expected no --sets, got {', '.join(sets)}; {' and '.join(WITH_SETS)} have some"
+        )
     if most is not None and name in BENCHES and name not in WITH_SETS:
         raise BringupError(
-            f"bench {name}: expected no --most, got {most}; {', '.join(WITH_SETS)} has recordings to count"
+            f"bench {name}: expected no --most, got {most}; {' and '.join(WITH_SETS)} have cases to count"
         )
-    if minutes is not None and name in BENCHES and name not in WITH_SETS:
+    if minutes is not None and name in BENCHES and name not in WITH_MINUTES:
         raise BringupError(
-            f"bench {name}: expected no --minutes, got {minutes:g}; {', '.join(WITH_SETS)} can go on later"
+            f"bench {name}: expected no --minutes, got {minutes:g}; {' and '.join(WITH_MINUTES)} can end after a time"
         )
     more: dict[str, Any] = {"sets": sets} if sets else {}
     more |= {} if most is None else {"most": most}
