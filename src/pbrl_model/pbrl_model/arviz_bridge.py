@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -133,6 +134,8 @@ def load_posterior(path: Path) -> Posterior:
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None
     try:
+        with import_module("h5py").File(path):  # h5netcdf complains on stderr where this cannot be done
+            pass
         data = az().from_netcdf(str(path))
     except (
         OSError,

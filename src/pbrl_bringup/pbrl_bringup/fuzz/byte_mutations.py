@@ -67,7 +67,7 @@ def _repeat(data: bytes, rng: np.random.Generator, _: Sequence[bytes]) -> bytes:
 
 
 def _splice(data: bytes, rng: np.random.Generator, others: Sequence[bytes]) -> bytes:
-    other = others[rng.integers(len(others))] if others else data
+    other = others[int(rng.integers(len(others)))] if others else data
     at, start, length = _place(data, rng), _place(other, rng), int(rng.geometric(0.005))
     skip = length if rng.random() < 0.5 else 0
     return data[:at] + other[start : start + length] + data[at + skip :]

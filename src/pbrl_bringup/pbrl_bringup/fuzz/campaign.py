@@ -127,7 +127,8 @@ def _one_process(
         "MPLCONFIGDIR": str(place / "plots"),
         "PYTHONWARNINGS": "ignore",
     }
-    index, last, enough = span.start - 1, {}, False
+    last: dict[str, Any] = {}
+    index, enough = span.start - 1, False
     with (place / "err").open("wb") as errors:
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, env=environment)
         try:

@@ -68,7 +68,7 @@ def plain_mcap(messages: Sequence[tuple[str, str, bytes, int]]) -> bytes:
             schema = writer.register_schema(kind, "ros2msg", message_definition(kind).encode())
             channels[topic] = writer.register_channel(topic, "cdr", schema)
         writer.add_message(channels[topic], when, data, when)
-    writer.finish()
+    writer.finish()  # type: ignore[no-untyped-call]
     return file.getvalue()
 
 

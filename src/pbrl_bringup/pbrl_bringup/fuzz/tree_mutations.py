@@ -43,7 +43,7 @@ def _mutate(
     if draw < 0.25:
         return (mutate_bytes if draw < 0.05 else mutate_text)(data, rng, others)
     if draw < 0.30:
-        bomb = bombs[rng.integers(len(bombs))].encode("utf-8", "surrogatepass")
+        bomb = bombs[int(rng.integers(len(bombs)))].encode("utf-8", "surrogatepass")
         return bomb if rng.random() < 0.5 else data + b"\n" + bomb
     tree = parse(data)
     for _ in range(1 + int(rng.geometric(0.5))):
