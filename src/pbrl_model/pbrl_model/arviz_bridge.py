@@ -134,8 +134,8 @@ def load_posterior(path: Path) -> Posterior:
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None
     try:
-        with import_module("h5py").File(path):  # h5netcdf complains on stderr where this cannot be done
-            pass
+        with import_module("h5py").File(path, "r") as file:  # h5netcdf complains on stderr where this cannot be done
+            file.attrs.get("_nc3_strict")
         data = az().from_netcdf(str(path))
     except (
         OSError,
