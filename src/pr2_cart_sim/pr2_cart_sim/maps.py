@@ -144,7 +144,7 @@ def _picture(path: Path, name: str) -> NDArray[np.uint8]:
     except (cv2.error, ValueError):
         image = None
     if image is None or image.shape != (height, width):
-        raise Pr2Error(f"{path}: image: expected a PGM or PNG picture, whole, got {name[:60]!r}; give its path")
+        raise Pr2Error(f"{path}: image: expected a picture, a whole PGM or PNG, got {name[:60]!r}; give its path")
     return np.asarray(image, dtype=np.uint8)
 
 

@@ -49,7 +49,7 @@ def planar_pose(pose: Pose, what: str) -> Array:
         raise PlannerError(f"{what}: expected it upright on the floor, got one that leans")
     found = np.array([p.x, p.y, yaw_of(np.array([q.x, q.y, q.z, q.w]))])
     if not (np.isfinite(found).all() and np.abs(found[:2]).max() <= FARTHEST):
-        raise PlannerError(f"{what}: expected x and y within {FARTHEST:g} m, and a heading, got {found}")
+        raise PlannerError(f"{what}: expected finite x and y within {FARTHEST:g} m, and a heading, got {found}")
     return found
 
 
