@@ -24,7 +24,6 @@ setup(
         "opencv-python-headless>=4.9",
         "pydantic>=2.6",
         "pymunk>=7.0",
-        "pyyaml>=6.0",
         "scipy>=1.12",
         "shapely>=2.0.3",
     ],

@@ -35,7 +35,7 @@ from bullet_sim.settings import (
 
 TagSource = Literal["noise", "rendered"]
 
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
 
 
 class Room(Settings):

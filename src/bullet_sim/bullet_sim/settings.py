@@ -7,12 +7,12 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
-import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from shapely.geometry import Polygon
 from shapely.validation import explain_validity
 
 from bullet_sim.errors import SimError, nearest
+from bullet_sim.yaml_text import parse_yaml
 
 
 class Settings(BaseModel):
@@ -48,19 +48,6 @@ Outline = Annotated[tuple[Vector2, ...], AfterValidator(_counter_clockwise)]
 """Corners (k, 2) [m] of a simple polygon, brought into counter-clockwise order."""
 
 
-class _StrictLoader(yaml.SafeLoader):
-    """YAML without silent overwriting: a key written twice is an error."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if isinstance(key, str) and key in seen:
-                raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is there twice", key_node.start_mark)
-            seen.add(key if isinstance(key, str) else None)
-        return super().construct_mapping(node, deep)
-
-
 def read_settings(path: Path, model: type[Model]) -> Model:
     """Read a YAML file into a settings model.
 
@@ -76,12 +63,9 @@ def read_settings(path: Path, model: type[Model]) -> Model:
     except (OSError, UnicodeDecodeError) as error:
         raise SimError(f"{path}: expected a readable YAML file, got {type(error).__name__}") from error
     try:
-        data = yaml.load(text, Loader=_StrictLoader)
-    except RecursionError as error:
-        raise SimError(f"{path}: expected YAML, got lists or mappings nested too deep") from error
-    except (yaml.YAMLError, TypeError, ValueError) as error:
-        told = " ".join(str(error).replace('in "<unicode string>", line', "at line").split())
-        raise SimError(f"{path}: expected YAML, got: {told}") from error
+        data = parse_yaml(text)
+    except ValueError as error:
+        raise SimError(f"{path}: {error}") from error
     return parse_settings(data, model, str(path))
 
 

@@ -64,6 +64,16 @@ class RecordingBuilder:
         """
         if not self.wants(topic):
             return
+        try:
+            self._take(topic, stamp_message, heard)
+        except (AttributeError, TypeError, ValueError, ArithmeticError) as error:
+            raise BagError(
+                f"{topic}: expected a message with the fields of its type, got another {type(stamp_message).__name__}: "
+                f"{error}; give another topic in a mapping"
+            ) from error
+
+    def _take(self, topic: str, stamp_message: Any, heard: float | None) -> None:
+        """Give a message to every role of its topic."""
         for role in self._topics[topic]:
             if role.kind == "grasps":
                 self._changes.append(change_in(topic, stamp_message))

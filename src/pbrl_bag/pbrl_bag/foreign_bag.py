@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import apsw
+import zstandard
 from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.rosbag1 import ReaderError as Ros1ReaderError
+from rosbags.rosbag2 import ReaderError as Ros2ReaderError
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
@@ -23,18 +27,23 @@ OURS = ("pbrl_msgs/msg/Scene", "pbrl_msgs/msg/Grasps")
 """Types that older bags do not describe, and no store of common types knows."""
 _UNREADABLE = (
     AnyReaderError,
+    Ros1ReaderError,
+    Ros2ReaderError,
     SerdeError,
     TypesysError,
     apsw.Error,
     OSError,
     ValueError,
-    KeyError,
-    IndexError,
+    LookupError,
+    EOFError,
+    RuntimeError,
+    struct.error,
+    zstandard.ZstdError,
     AssertionError,
     TypeError,
     AttributeError,
     NotImplementedError,
-    OverflowError,
+    ArithmeticError,
     MemoryError,
 )
 """What a stranger's file can end a reader with."""

@@ -125,7 +125,7 @@ def gaps_in(time: Array) -> Array:
 
 def _topic(name: str, type_name: str, stamps: list[int], start: int, qos: tuple[Qos, ...]) -> TopicInfo:
     """Describe one topic."""
-    time = np.sort((np.array(stamps, dtype=np.int64) - start) / 1e9)
+    time = np.sort(np.array([stamp - start for stamp in stamps], dtype=np.float64) / 1e9)  # they have 64 bits, unsigned
     span = time[-1] - time[0]
     rate = float((len(time) - 1) / span) if span > 0 else float("nan")
     return TopicInfo(name, type_name, len(time), rate, float(time[0]), float(time[-1]), gaps_in(time), qos)

@@ -26,7 +26,9 @@ from pbrl_bag.errors import BagError
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER_OPCODE, DATA_END_OPCODE = int(Opcode.FOOTER), int(Opcode.DATA_END)
 CHUNK_OPCODE, MESSAGE_OPCODE = int(Opcode.CHUNK), int(Opcode.MESSAGE)
-LARGEST_CHUNK = 1 << 32  # [bytes] uncompressed; beyond it, the size is damaged
+LARGEST_CHUNK = 1 << 28  # [bytes] uncompressed; a recorder's have some megabytes
+FREE = 1 << 28  # [bytes] that a file may unpack to, however small it is
+DENSEST = 200  # times its own size that a file may unpack to beyond that; recordings do 2 to 20
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _SPAN = struct.Struct("<QQ")
@@ -65,6 +67,7 @@ class McapFile:
     header: Header | None = None
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
+    _left: int = FREE
 
     def messages(self) -> Iterator[RawMessage]:
         """Yield every message of every finished chunk, in the order of the file.
@@ -100,6 +103,7 @@ class McapFile:
     def _scan(self, file: BinaryIO, size: int) -> Iterator[RawMessage]:
         """Yield messages record by record until the footer or the end."""
         summary = False
+        self._left = max(FREE, DENSEST * size)
         while True:
             at = file.tell()
             head = file.read(_RECORD.size)
@@ -139,7 +143,8 @@ class McapFile:
         if opcode == MESSAGE_OPCODE:
             yield self._message(body)
         elif opcode == CHUNK_OPCODE:
-            data = _uncompressed(Chunk.read(_stream(body)))
+            data = _uncompressed(Chunk.read(_stream(body)), self._left)
+            self._left -= len(data)
             messages = self._messages_of(data)
             self.chunks += 1
             yield from messages
@@ -193,14 +198,21 @@ def _stream(body: bytes) -> ReadDataStream:
     return ReadDataStream(io.BytesIO(body))
 
 
-def _uncompressed(chunk: Chunk) -> bytes:
-    """Return the records of a chunk, its checksum checked."""
-    if chunk.uncompressed_size > LARGEST_CHUNK:
-        raise ValueError(f"a chunk of {chunk.uncompressed_size} bytes")
+def _uncompressed(chunk: Chunk, left: int) -> bytes:
+    """Return the records of a chunk, its checksum checked; what would unpack to more than is left is refused before."""
+    size = chunk.uncompressed_size
+    if chunk.compression == "zstd":  # what stands in its own head counts, whatever the chunk says
+        size = max(size, zstandard.frame_content_size(chunk.data))
+    if size > LARGEST_CHUNK:
+        raise ValueError(f"a chunk of {size} bytes, expected at most {LARGEST_CHUNK}")
+    if size > left:
+        raise ValueError(f"a file that unpacks to more than {DENSEST} times its size")
     if chunk.compression == "zstd":
         data = zstandard.decompress(chunk.data, chunk.uncompressed_size)
     elif chunk.compression == "lz4":
-        data = lz4.frame.decompress(chunk.data)
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+        if len(data) != size:
+            raise ValueError(f"a chunk of another size than the {size} bytes that it says")
     elif chunk.compression == "":
         data = chunk.data
     else:

@@ -151,12 +151,24 @@ def files_of_bag(folder: Path) -> tuple[Path, ...]:
     if not isinstance(names, list):
         raise BagError(f"{folder}: {FILE_NAME}: relative_file_paths: expected a list, got {names!r}")
     files = [folder / str(name) for name in names]
-    for path in files:
-        if not path.exists():
-            raise BagError(f"{folder}: expected {path.name}, which {FILE_NAME} names, got no such file")
+    for name, path in zip(map(str, names), files, strict=True):
+        if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
+            raise BagError(
+                f"{folder}: {FILE_NAME}: relative_file_paths: expected files in the bag's folder, got {name[:60]!r}"
+            )
+        if not _is_there(path):
+            raise BagError(f"{folder}: expected {path.name[:60]}, which {FILE_NAME} names, got no such file")
     if not files:
         raise BagError(f"{folder}: expected relative_file_paths in {FILE_NAME}, got none")
     return tuple(files)
+
+
+def _is_there(path: Path) -> bool:
+    """Tell whether there is such a file; none has a name that is too long."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
 
 
 def qos_text(profiles: tuple[Qos, ...]) -> str:
@@ -172,7 +184,7 @@ def qos_from_text(text: str, where: str) -> tuple[Qos, ...]:
         BagError: not a list of profiles.
     """
     try:
-        entries = yaml.safe_load(text) if text else []
+        entries = parse_yaml(text) if text else []
         return tuple(qos_from_metadata(entry) for entry in entries or [])
-    except (yaml.YAMLError, AttributeError, TypeError, KeyError, ValueError) as error:
+    except (AttributeError, TypeError, LookupError, ValueError, ArithmeticError) as error:
         raise BagError(f"{where}: offered_qos_profiles: expected a list of QoS profiles, got: {error}") from error

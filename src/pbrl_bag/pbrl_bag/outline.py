@@ -10,14 +10,16 @@ from numpy.typing import ArrayLike
 from pbrl_bag.types import Array
 
 LARGEST = 100.0  # [m] a corner further than this from the body's tag is a slip of unit or sign
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
 
 
 def fault_of_name(name: str) -> str:
     """Say what is wrong with a body's name, which is part of topics and of file names; nothing if all is well."""
     if _NAME.fullmatch(name):
         return ""
-    return f"expected a name of letters, digits and underscores that starts with a letter, got {name[:60]!r}"
+    return (
+        f"expected a name of letters, digits and underscores, 100 at most, that starts with a letter, got {name[:60]!r}"
+    )
 
 
 def fault_of_outline(corners: ArrayLike) -> str:

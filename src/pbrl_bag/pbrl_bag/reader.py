@@ -161,7 +161,10 @@ def _collected(
 def _give(builder: RecordingBuilder, also: Hearers, name: str, decoded: Any, message: RawMessage) -> None:
     builder.add(name, decoded, message.log_time / NANOSECONDS)
     if name in also:
-        also[name](decoded)
+        try:
+            also[name](decoded)
+        except (AttributeError, TypeError, ValueError, ArithmeticError) as error:  # a stranger's type of that name
+            raise BagError(f"{message.topic}: expected a {message.type}, got one with other fields: {error}") from error
 
 
 def _taken_together(
@@ -174,7 +177,11 @@ def _taken_together(
     if batch is None or not builder.takes(name, batch):
         return False
     for k in (0, len(messages) // 2, -1):  # a stranger's type of that name can have its fields in another order
-        if not np.array_equal(batch.values[k], _numbers(decoder.decode(messages[k])), equal_nan=True):
+        try:
+            alike = np.array_equal(batch.values[k], _numbers(decoder.decode(messages[k])), equal_nan=True)
+        except (AttributeError, TypeError, ValueError):  # it has not even those fields
+            alike = False
+        if not alike:
             return False
     builder.add_batch(name, batch, np.array([one.log_time for one in messages]) / NANOSECONDS)
     return True

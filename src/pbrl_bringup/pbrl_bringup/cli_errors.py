@@ -21,6 +21,10 @@ USER_ERRORS = {
 }
 
 
+LONGEST = 2000
+"""Letters of a message."""
+
+
 def complain(message: str, code: int) -> int:
     """Say what is wrong, and return the exit code."""
     print(f"pbrl: {message}", file=sys.stderr)
@@ -29,17 +33,29 @@ def complain(message: str, code: int) -> int:
 
 def complain_of(error: Exception) -> int:
     """Say what is wrong, and return 2 for something that the person can mend, 1 for a fault of ours."""
-    return complain(told_of(error), 2 if _is_for_the_user(error) else 1)
+    return complain(told_of(error), 2 if is_for_the_user(error) else 1)
 
 
 def told_of(error: Exception) -> str:
     """Return what a person is told of an error, in a line."""
-    return " ".join(str(error).split()) if _is_for_the_user(error) else _fault(error)
+    return _short(" ".join(str(error).split())) if is_for_the_user(error) else _fault(error)
 
 
-def _is_for_the_user(error: Exception) -> bool:
+def is_for_the_user(error: Exception) -> bool:
+    """Tell whether an error is one of ours, whose message says what the person can mend."""
+    return isinstance(error, errors_of_ours())
+
+
+def errors_of_ours() -> tuple[type[Exception], ...]:
+    """Return the classes of `USER_ERRORS` whose modules are loaded."""
     loaded = [(sys.modules[module], name) for module, name in USER_ERRORS.items() if module in sys.modules]
-    return isinstance(error, tuple(getattr(module, name) for module, name in loaded))
+    return tuple(getattr(module, name) for module, name in loaded)
+
+
+def _short(text: str) -> str:
+    """Return a text that a terminal can show: what a file says can be of any length, and of any letters."""
+    text = "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
 
 
 def _fault(error: Exception) -> str:

@@ -16,7 +16,7 @@ def bench(
         str,
         typer.Argument(
             help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose, calibration, concealed, tags, control, "
-            "cart, namo, lattice, next-experiment, foreign, played-again, view, mismatch or scale."
+            "cart, namo, lattice, next-experiment, foreign, played-again, two-robots, view, mismatch, scale or fuzz."
         ),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,
@@ -26,15 +26,14 @@ def bench(
         str | None,
         typer.Option(
             help="Sets of cases of the bench concealed, with commas: clean, single, pairs, withheld, furnished, rough. "
-            "Default: all."
+            "Of the bench fuzz: names of readers and nodes. Default: all."
         ),
     ] = None,
     most: Annotated[
-        int | None, typer.Option(min=1, help="Recordings an effect at most, and ten times as many clean ones.")
+        int | None, typer.Option(min=1, help="Recordings an effect at most, and ten times clean ones; hostile inputs.")
     ] = None,
     minutes: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="After which no recording is begun; what there is is reported, and goes on later."),
+        float | None, typer.Option(min=0.0, help="After which no case is begun; what there is is reported.")
     ] = None,
     scheduler: Scheduler = None,
 ) -> int:

@@ -71,16 +71,16 @@ def run_demo(settings: DemoSettings, say: Say) -> Path:
         BagError: the recording is not as it should be.
     """
     started = time.monotonic()
-    say("[bold]1[/] starting simulator, controller, recorder and model node")
+    say("1 starting simulator, controller, recorder and model node")
     bag = fresh_bag(settings.out)
     posteriors = push_and_learn(settings, bag, say)
-    say("[bold]4[/] writing the page")
+    say("4 writing the page")
     recording = read_recording(bag)
     report = demo_report(settings, recording, posteriors, time.monotonic() - started)
     write_json(settings.out / "report.json", fit_summary(bag, posteriors, time.monotonic() - started))
     page = settings.out / "report.html"
     write_page(report, page)
-    say(f"  [bold]{report.verdict}[/]")
+    say(f"  {report.verdict}")
     for line in filter(None, [report.detail, truth_line(report)]):
         say(f"  {line}")
     return page
@@ -119,13 +119,13 @@ def push_and_learn(settings: DemoSettings, bag: Path, say: Say) -> dict[str, Pos
                 client.wait_for_service(service, START_TIME)
             client.wait_for_topic("/body_controller/status", START_TIME)
             client.wait_until(lambda: any(bag.glob("*.mcap")), START_TIME, "the recorder made no file")
-            say("[bold]2[/] the push")
+            say("2 the push")
             programs.start("push", commands["push"])
             watch_push(client, status, say)
             # The bag is closed first; then whoever has nothing left to do makes room for the fit.
             for name in ("recorder", "push", "controller", "sim"):
                 programs.stop(name)
-            say("[bold]3[/] learning from the recording")
+            say("3 learning from the recording")
             return learn(client, models, bag, settings.seed)
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 from pathlib import Path
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix, get_package_share_directory
 
 from pbrl_bringup.errors import BringupError
+
+_PROGRAM = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 
 
 def workspace() -> Path:
@@ -59,9 +62,13 @@ def node_executable(package: str, executable: str) -> Path:
     """
     try:
         folder = Path(get_package_prefix(package)) / "lib" / package
+    except ValueError as error:
+        raise BringupError(f"package: expected a name of letters, digits, _ and -, got {package[:60]!r}") from error
     except PackageNotFoundError as error:
         raise BringupError(f"package {package!r} is not in the ament index; build the workspace with ./pbrl") from error
     path = folder / executable
+    if not _PROGRAM.fullmatch(executable):  # a graph file starts programs of packages, and none from elsewhere
+        raise BringupError(f"{package}: expected the name of an executable of its own, got {executable[:60]!r}")
     if not (path.is_file() and os.access(path, os.X_OK)):
         known = sorted(item.name for item in folder.glob("*") if os.access(item, os.X_OK))
         raise BringupError(f"{package} has no executable {executable!r}; it has {', '.join(known) or 'none'}")

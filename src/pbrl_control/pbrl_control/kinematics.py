@@ -47,11 +47,16 @@ class Posture:
     @classmethod
     def from_joint_states(cls, names: Sequence[str], positions: Sequence[float]) -> Posture:
         """Pick the posture out of a joint-state message's arrays; raise ControlError where a joint is missing."""
+        if len(names) != len(positions):
+            raise ControlError(f"joint states: expected a position a name, {len(names)}, got {len(positions)}")
         table = dict(zip(names, positions, strict=True))
         wanted = (*BODY_JOINTS, *ARM_JOINTS["left"], *ARM_JOINTS["right"])
         missing = [name for name in wanted if name not in table]
         if missing:
             raise ControlError(f"joint states: expected {', '.join(wanted)}; {', '.join(missing)} missing")
+        strange = [name for name in wanted if not math.isfinite(table[name])]
+        if strange:
+            raise ControlError(f"joint states: expected finite positions, got {table[strange[0]]} of {strange[0]}")
         left, right = (np.array([table[name] for name in ARM_JOINTS[side]], dtype=float) for side in SIDES)
         return cls(float(table["waist"]), float(table["torso"]), left, right)
 

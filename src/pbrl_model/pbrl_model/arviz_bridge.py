@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +114,8 @@ def _write(data: Any, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         data.to_netcdf(str(unfinished))
         unfinished.replace(path)
-    except OSError as error:
+    except (OSError, ValueError) as error:  # netCDF has no text with a zero in it
+        unfinished.unlink(missing_ok=True)
         raise ModelError(f"{path}: expected to write a posterior there, got {' '.join(str(error).split())}") from None
 
 
@@ -132,8 +134,17 @@ def load_posterior(path: Path) -> Posterior:
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None
     try:
+        with import_module("h5py").File(path, "r") as file:  # h5netcdf complains on stderr where this cannot be done
+            file.attrs.get("_nc3_strict")
         data = az().from_netcdf(str(path))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        RuntimeError,
+    ) as error:  # HDF5 fails in any way
         raise ModelError(f"{path}: expected netCDF, got {' '.join(str(error).split())}") from None
     try:
         return from_inference_data(data)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from bullet_sim.settings import Positive, Settings, read_settings
+from pr2_cart_sim.bare_png import PNG, bare_png
 from pr2_cart_sim.errors import Pr2Error
 
 Array = NDArray[np.float64]
@@ -24,6 +26,8 @@ FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 
 LARGEST = 20_000_000
 """Cells in a map at most."""
+HEAD = 4096
+"""[bytes] in which a PGM says how large it is."""
 
 
 @dataclass(frozen=True)
@@ -116,17 +120,42 @@ def load_map(path: Path) -> GridMap:
         raise Pr2Error(f"{path}: mode: expected trinary, got {said.mode!r}; write the map again in that mode")
     if said.origin[2] != 0:
         raise Pr2Error(f"{path}: origin: expected a yaw of 0, got {said.origin[2]}; turn the image instead")
-    file = path.parent / said.image
-    image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) if file.is_file() else None
-    if image is None:
-        raise Pr2Error(f"{path}: image: expected a picture that OpenCV reads, got {said.image!r}; give its path")
-    if image.size > LARGEST:
-        raise Pr2Error(f"{file}: expected at most {LARGEST} cells, got {image.size}; use a coarser map")
+    image = _picture(path, said.image)
     dark = image[::-1] / 255.0 if said.negate else 1.0 - image[::-1] / 255.0
     cells = np.full(image.shape, UNKNOWN, np.int8)
     cells[dark < said.free_thresh] = FREE
     cells[dark > said.occupied_thresh] = OCCUPIED
     return GridMap(said.resolution, said.origin[:2], cells)
+
+
+def _picture(path: Path, name: str) -> NDArray[np.uint8]:
+    """Return the grey levels of a map's image."""
+    file = path.parent / name
+    try:
+        data = file.read_bytes() if file.is_file() and file.stat().st_size <= 4 * LARGEST else b""
+    except (OSError, ValueError):
+        data = b""
+    width, height = _size(data[:HEAD])
+    if width * height > LARGEST:
+        raise Pr2Error(f"{file}: expected at most {LARGEST} cells, got {width} x {height}; use a coarser map")
+    try:
+        data = bare_png(data) if data.startswith(PNG) else data
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if width and height else None
+    except (cv2.error, ValueError):
+        image = None
+    if image is None or image.shape != (height, width):
+        raise Pr2Error(f"{path}: image: expected a picture, a whole PGM or PNG, got {name[:60]!r}; give its path")
+    return np.asarray(image, dtype=np.uint8)
+
+
+def _size(head: bytes) -> tuple[int, int]:
+    """Return the width and height that a PNG or PGM says it has, before anything is unpacked; 0, 0: it is neither."""
+    if head.startswith(PNG) and len(head) >= 24:
+        return int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
+    words = re.sub(rb"#[^\n]*", b" ", head[2:]).split()
+    if head[:2] in (b"P2", b"P5") and len(words) >= 2 and all(word.isdigit() and len(word) < 10 for word in words[:2]):
+        return int(words[0]), int(words[1])
+    return 0, 0
 
 
 def save_map(grid: GridMap, path: Path) -> None:

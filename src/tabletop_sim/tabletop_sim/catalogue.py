@@ -67,7 +67,7 @@ class DeskItem(Settings):
         if not isinstance(data, Mapping):
             return data
         kind = data.get("kind", "box")
-        if kind not in KINDS:
+        if not isinstance(kind, str) or kind not in KINDS:
             raise ValueError(f"kind: unknown kind {kind!r}; {nearest(str(kind), KINDS)}")
         return {**KINDS[kind], **data}
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from pbrl_bag.clocks import clock_offsets
 from pbrl_bag.decoding import PoseSample, poses_in, seconds, wrench_in
+from pbrl_bag.errors import BagError
 from pbrl_bag.foreign_bag import ForeignBag
 from pbrl_bag.reader import Decoder, files_of, opened
 from pbrl_bag.types import Array
@@ -138,7 +139,13 @@ def candidates_of(path: Path) -> Candidates:
             found.types[message.topic] = message.type
             kind = message.type.rsplit("/", 1)[-1]
             if kind in (*POSES, TRANSFORMS, ARRAY, WRENCH, JOINTS, TEXT):
-                _take(found, message.topic, kind, decode(message), message.log_time * 1e-9)
+                decoded = decode(message)
+                try:
+                    _take(found, message.topic, kind, decoded, message.log_time * 1e-9)
+                except (AttributeError, TypeError, ValueError, ArithmeticError) as error:
+                    raise BagError(
+                        f"{path}: {message.topic}: expected a {message.type}, got one with other fields: {error}"
+                    ) from error
     _put_clocks_right(found)
     return found
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Sequence
 
+from ament_index_python.resources import get_resource
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
@@ -26,8 +27,10 @@ def message_class(type_name: str) -> type:
     """
     package, _, name = type_name.partition("/msg/")
     try:
+        if not get_resource("rosidl_interfaces", package):  # a stranger's word: no other module is loaded for it
+            raise LookupError(f"a package {package!r} without messages")
         return getattr(importlib.import_module(f"{package}.msg"), name)
-    except (ImportError, AttributeError, ValueError) as error:
+    except (ImportError, AttributeError, ValueError, LookupError, OSError) as error:
         raise BagError(
             f"message type {type_name!r}: expected it in package {package!r}, got: {error}; "
             "source the workspace that has the package"

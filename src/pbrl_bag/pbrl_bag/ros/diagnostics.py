@@ -23,6 +23,9 @@ PERIOD = 1.0
 SILENT = 2.0
 """Without a message for so long [s], a stream counts as silent."""
 
+SAID = 5.0
+"""Between two warnings about messages that cannot be used [s]."""
+
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
@@ -81,7 +84,14 @@ class Diagnostics:
         return self._inputs.setdefault(topic, Input(topic, needed=needed, stream=stream))
 
     def subscribe(
-        self, kind: Any, topic: str, callback: Callable[[Any], None], qos: QoSProfile, *, needed: bool = True
+        self,
+        kind: Any,
+        topic: str,
+        callback: Callable[[Any], None],
+        qos: QoSProfile,
+        *,
+        needed: bool = True,
+        refuses: tuple[type[Exception], ...] = (),
     ) -> Subscription:
         """Subscribe the node to a topic of its namespace, and keep account of it.
 
@@ -91,13 +101,18 @@ class Diagnostics:
             callback: what is done with a message.
             qos: as for any subscription; what is latched comes when it changes, and is not missed when it does not.
             needed: whether the node can do nothing without it.
+            refuses: errors that `callback` raises of a message that cannot be used; it is left aside with a warning.
         """
         stream = qos.durability != DurabilityPolicy.TRANSIENT_LOCAL
         entry = self.input("/" + topic.removeprefix("/"), needed=needed, stream=stream)
 
         def counted(message: Any) -> None:
             entry.heard()
-            callback(message)
+            try:
+                callback(message)
+            except refuses as error:
+                told = " ".join(str(error).split())
+                self._node.get_logger().warning(f"{entry.topic}: left aside: {told}", throttle_duration_sec=SAID)
 
         return self._node.create_subscription(kind, relative(topic), counted, qos)
 

@@ -29,12 +29,15 @@ BENCHES = {
     "played-again": "what is learned live, and from the recording of it played again: number for number",
     "two-robots": "two robots in one ROS domain, each in a namespace: both move a table out of the way and arrive",
     "view": "the viewer on ten minutes of five objects: first picture, pictures a second, console",
+    "fuzz": "hostile files and messages by the thousand: each is read, or refused in one line",
     "mismatch": "the watch over a stream: half an hour of clean pushing without an alarm, and how late alarms are",
     "scale": "many recordings on a Dask cluster: two workers against one, a worker killed, a thousand queued",
 }
 
-WITH_SETS = ("concealed",)
-"""Benches whose cases come in sets."""
+WITH_SETS = ("concealed", "fuzz")
+"""Benches whose cases come in sets, and can be counted."""
+WITH_MINUTES = ("concealed", "fuzz")
+"""Benches that can end after a time."""
 
 
 def command(
@@ -55,23 +58,25 @@ def command(
         seed: of every random draw.
         quick: whether to do a smaller version.
         sets: which sets of cases, for a bench that has some; none: all.
-        most: recordings an effect at most, for a bench that has sets; None: all.
-        minutes: after which a bench that has sets begins no recording; None: it does all.
+        most: recordings an effect at most, or hostile inputs in all, for a bench that has sets; None: all.
+        minutes: after which such a bench begins no recording, or gives no further input; None: it does all.
         scheduler: where its independent parts are done; None: in processes of this machine.
 
     Raises:
-        BringupError: there is no bench of that name, it has no sets, or none of such a name, or there is no such
+        BringupError: there is no bench of that name, it has no such option, no set of such a name, or there is no such
             scheduler.
     """
     if sets and name in BENCHES and name not in WITH_SETS:
-        raise BringupError(f"bench {name}: expected no --sets, got {', '.join(sets)}; {', '.join(WITH_SETS)} has some")
+        raise BringupError(
+            f"bench {name}: expected no --sets, got {', '.join(sets)}; {' and '.join(WITH_SETS)} have some"
+        )
     if most is not None and name in BENCHES and name not in WITH_SETS:
         raise BringupError(
-            f"bench {name}: expected no --most, got {most}; {', '.join(WITH_SETS)} has recordings to count"
+            f"bench {name}: expected no --most, got {most}; {' and '.join(WITH_SETS)} have cases to count"
         )
-    if minutes is not None and name in BENCHES and name not in WITH_SETS:
+    if minutes is not None and name in BENCHES and name not in WITH_MINUTES:
         raise BringupError(
-            f"bench {name}: expected no --minutes, got {minutes:g}; {', '.join(WITH_SETS)} can go on later"
+            f"bench {name}: expected no --minutes, got {minutes:g}; {' and '.join(WITH_MINUTES)} can end after a time"
         )
     if scheduler is not None and name == "scale":
         raise BringupError(f"bench scale: expected no --scheduler, got {scheduler}; it compares clusters of its own")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pbrl_bringup.demo import DemoSettings, run_demo
 from pbrl_bringup.files import output_folder
-from pbrl_bringup.terminal import output, say
+from pbrl_bringup.terminal import output, say, styled
 
 
 def command(out: Path, seed: int, gui: bool | None) -> int:
@@ -20,6 +20,6 @@ def command(out: Path, seed: int, gui: bool | None) -> int:
     window = bool(os.environ.get("DISPLAY")) and gui is not False if gui is None else gui
     started = time.monotonic()
     page = run_demo(DemoSettings(out=output_folder(out), seed=seed, gui=window), say)
-    say(f"[dim]done in {time.monotonic() - started:.0f} s; open the page in any browser:[/]")
+    say(styled(f"done in {time.monotonic() - started:.0f} s; open the page in any browser:", "dim"))
     output().print(str(page.resolve()))
     return 0

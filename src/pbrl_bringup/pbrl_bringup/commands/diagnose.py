@@ -21,7 +21,7 @@ from pbrl_bringup.files import result_folder, write_json
 from pbrl_bringup.scale.address import LOCAL
 from pbrl_bringup.scale.command_line import command_of
 from pbrl_bringup.scale.recordings import choose_recordings
-from pbrl_bringup.terminal import output, say, table
+from pbrl_bringup.terminal import output, say, styled, table
 from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis, diagnose
 from pbrl_mismatch.effects.own import forget_effect, own_effects
 from pbrl_mismatch.effects.own_file import load_effects
@@ -124,7 +124,7 @@ def command(
             found = diagnose(recording, options)
         write_found(found, recording, folder, asked_for, options)
     print_diagnosis(found)
-    output().print(f"[bold]{out / 'report.html'}[/]")
+    output().print(styled(str(out / "report.html"), "bold"))
     return 0
 
 

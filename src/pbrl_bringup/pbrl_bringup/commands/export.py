@@ -11,7 +11,7 @@ from pbrl_bringup.export.rigid import rigid_body
 from pbrl_bringup.export.sdf import sdf_text
 from pbrl_bringup.export.urdf import urdf_text
 from pbrl_bringup.files import write_text
-from pbrl_bringup.terminal import output
+from pbrl_bringup.terminal import output, styled
 from pbrl_model.arviz_bridge import save_model_draws
 from pbrl_model.model_file import SavedModel, load_model, save_model
 from pbrl_model.model_schema import SCHEMA, schema_text
@@ -36,7 +36,7 @@ def command(model: Path, form: str, out: Path | None, height: float, only: str |
     path = out or Path(f"{found.object}.{suffix}")
     written = _write(found, form, path, height)
     for each in written:
-        output().print(f"[bold]{each}[/]")
+        output().print(styled(str(each), "bold"))
     return 0
 
 

@@ -22,7 +22,7 @@ from pbrl_bringup.report_page import number, rounded, write_page
 from pbrl_bringup.scale.address import LOCAL
 from pbrl_bringup.scale.command_line import command_of
 from pbrl_bringup.scale.recordings import choose_recordings
-from pbrl_bringup.terminal import output, say, table
+from pbrl_bringup.terminal import output, say, styled, table
 from pbrl_model.arviz_bridge import save_posterior
 from pbrl_model.fitted_model import fitted_model
 from pbrl_model.fitting.fit import Fit, FitOptions, fit_recording
@@ -108,7 +108,7 @@ def command(
             fit = fit_recording(recording, options)
         report = write_fit(recording, fit, folder, seed, "./pbrl " + shlex.join(sys.argv[1:]))
     print_fit(fit, report)
-    output().print(f"[bold]{out / 'report.html'}[/]")
+    output().print(styled(str(out / "report.html"), "bold"))
     return 0
 
 

@@ -10,10 +10,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from rich.text import Text
+
 from pbrl_bringup.benches.rows import last_line, report
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.files import output_folder
-from pbrl_bringup.terminal import output, say, table
+from pbrl_bringup.terminal import output, say, styled, table
 
 
 def run_measured(
@@ -76,5 +78,5 @@ def _value(value: float | None) -> str:
     return f"{value:.0f}" if value == int(value) else f"{value:.4g}"
 
 
-def _mark(holds: bool) -> str:
-    return "[green]yes[/]" if holds else "[red]no[/]"
+def _mark(holds: bool) -> Text:
+    return styled("yes", "green") if holds else styled("no", "red")

@@ -18,7 +18,7 @@ from pbrl_bringup.diagnosis.door_figures import force_against_angle, from_above,
 from pbrl_bringup.diagnosis.told import Told, told_of_object
 from pbrl_bringup.files import result_folder, write_json, write_text
 from pbrl_bringup.report_page import TEMPLATES, number, rounded
-from pbrl_bringup.terminal import output, table
+from pbrl_bringup.terminal import output, styled, table
 from pbrl_mismatch.joint.diagnosis import DoorDiagnosis, DoorsDiagnosis, diagnose_doors
 from pbrl_mismatch.options import DiagnoseOptions
 
@@ -54,7 +54,7 @@ def run_doors(recording: Recording, options: DiagnoseOptions, out: Path, asked_f
             found = diagnose_doors(recording, options)
         write_doors(found, folder, asked_for)
     print_doors(found)
-    output().print(f"[bold]{out / 'report.html'}[/]")
+    output().print(styled(str(out / "report.html"), "bold"))
     return 0
 
 

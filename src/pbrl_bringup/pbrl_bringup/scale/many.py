@@ -17,7 +17,7 @@ from pbrl_bringup.files import output_folder, result_folder, write_json, write_t
 from pbrl_bringup.scale.cluster import cluster
 from pbrl_bringup.scale.pieces import Failed, run_pieces
 from pbrl_bringup.scale.recordings import folder_names
-from pbrl_bringup.terminal import output, progress, say, table
+from pbrl_bringup.terminal import output, progress, say, styled, table
 
 Row = dict[str, str | float | bool | None]
 """What is said of one object in a summary, by column."""
@@ -82,7 +82,7 @@ def run_many(
         ordered = [found[index] for index in range(len(bags))]
         write_summary(ordered, time.perf_counter() - started, out)
     print_summary(ordered, shown, what)
-    output().print(f"[bold]{out / SUMMARY}[/]")
+    output().print(styled(str(out / SUMMARY), "bold"))
     failures = [each for each in ordered if each.failed]
     if failures:
         raise BringupError(

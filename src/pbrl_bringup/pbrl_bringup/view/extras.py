@@ -106,7 +106,9 @@ class Extras:
         for model in message.models:
             names = [str(name) for name in model.parameters]
             samples = np.array(model.samples, dtype=np.float64)
-            if not names or len(samples) != len(names) * int(model.draws) or not np.isfinite(samples).all():
+            several = (model.mean, model.sd, model.units)
+            fit = names and all(len(each) == len(names) for each in several)
+            if not fit or len(samples) != len(names) * int(model.draws) or not np.isfinite(samples).all():
                 self._note(f"/object_models: the draws of {model.object!r} do not fit its parameters: not drawn")
                 continue
             numbers = list(zip(names, map(float, model.mean), map(float, model.sd), map(str, model.units), strict=True))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import threading
 from bisect import bisect_left
 from collections.abc import AsyncIterator
@@ -35,6 +36,8 @@ MARGIN = 1.0
 """Seconds before what is new that are told again, so that forces find the gripper's pose; the page knows them."""
 BACK = 1.0
 """A stamp so much [s] before the last one means that the clock began anew."""
+UNIT = 0.1
+"""How much the length of a quaternion may differ from one; a pose with another is left out."""
 TOLD = 5000
 """Samples of a stream in an answer at most."""
 
@@ -117,7 +120,7 @@ class LiveGraph:
             self._add(role, felt.time, (*felt.force, *felt.torque))
         else:
             for pose in poses_in(topic, message, None):
-                if pose.frame == CONTRACT.world:
+                if pose.frame == CONTRACT.world and abs(math.hypot(*pose.quaternion) - 1.0) < UNIT:
                     self._add(role, pose.time, (*pose.position, *pose.quaternion))
 
     def _add(self, role: Role, time: float, row: tuple[float, ...]) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bag import BodyGeometry, Recording
+from pbrl_bringup.files import without_nan
 from pbrl_bringup.view.tracks import METRES, BandTrack, PoseTrack, force_track, listed, pose_track, wrench_track
 
 Array = NDArray[np.float64]
@@ -54,7 +55,7 @@ class Shown:
             "title": self.title,
             "origin": self.origin,
             "end": round(self.end, 4),
-            **self.still,
+            **without_nan(self.still),  # plans, models and places are as somebody said them
             "streams": self.detail(0.0, self.end, most),
         }
 

@@ -92,7 +92,7 @@ def force_track(stream: WrenchStream, gripper: PoseStream | None, origin: float)
     """
     force = stream.force
     if stream.frame == "sensor":
-        if gripper is None or not np.isfinite(gripper.quaternion).all():
+        if gripper is None or not len(gripper.time) or not _turns(gripper.quaternion):
             return None
         nearest = np.clip(np.searchsorted(gripper.time, stream.time), 0, len(gripper.time) - 1)
         force = Rotation.from_quat(gripper.quaternion[nearest]).apply(force.copy())
@@ -100,9 +100,18 @@ def force_track(stream: WrenchStream, gripper: PoseStream | None, origin: float)
     return BandTrack(stream.time - origin, sign * force[:, :2])
 
 
+def _turns(quaternion: Array) -> bool:
+    """Tell whether rows (n, 4) are orientations, of whatever length a driver has left them."""
+    with np.errstate(over="ignore"):
+        length = np.linalg.norm(quaternion, axis=1)
+    return bool(np.isfinite(length).all() and (length > 0.0).all())
+
+
 def listed(values: Array, digits: int) -> list[float | None]:
     """Return numbers rounded, None for those that are not finite: JSON has no NaN."""
-    rounded: list[float | None] = np.round(values, digits).tolist()
-    if np.isfinite(values).all():
-        return rounded
-    return [value if value is not None and np.isfinite(value) else None for value in rounded]
+    with np.errstate(over="ignore"):
+        rounded: Array = np.round(values, digits)
+    told: list[float | None] = rounded.tolist()
+    if np.isfinite(rounded).all():
+        return told
+    return [value if value is not None and np.isfinite(value) else None for value in told]

@@ -25,6 +25,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
 
+from pbrl_bag.errors import BagError
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
@@ -42,6 +43,7 @@ from pbrl_control.ros.conversions import (
     base_to_msg,
     expected_from_msg,
     grips_from_msg,
+    movable_from_msg,
     posture_from_msg,
     seconds,
     tag_from_msg,
@@ -107,7 +109,7 @@ class BodyControllerNode(Node):
         hear = self._diagnostics.subscribe
         hear(String, "robot_description", self._on_description, LATCHED)
         hear(JointState, "joint_states", self._on_joints, NEWEST)
-        hear(Scene, "scene", self._on_scene, LATCHED, needed=False)
+        hear(Scene, "scene", self._on_scene, LATCHED, needed=False, refuses=(BagError,))
         hear(Grasps, "grasps", self._on_grasps, LATCHED, needed=False)
         hear(TwistStamped, "object_twist_command", self._on_twist, COMMANDS, needed=False)
         hear(Bool, "emergency_stop", self._on_emergency, LATCHED, needed=False)
@@ -138,9 +140,8 @@ class BodyControllerNode(Node):
             self.get_logger().error(str(error))
 
     def _on_scene(self, message: Scene) -> None:
-        for body in message.bodies:
-            if body.movable:
-                self._listen_to_tag(body.name)
+        for name in movable_from_msg(message):
+            self._listen_to_tag(name)
 
     def _on_grasps(self, message: Grasps) -> None:
         self._grips = grips_from_msg(message)

@@ -9,6 +9,7 @@ from pbrl_msgs.msg import Grasps, Scene
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from pbrl_bag.geometry import bodies_of_scene
 from pbrl_control.kinematics import Posture
 from pbrl_control.percept import BodyShape, Grip, Tag
 from pbrl_control.planar import Array
@@ -61,11 +62,18 @@ def expected_from_msg(message: WrenchStamped) -> Array:
 
 
 def bodies_from_msg(message: Scene) -> dict[str, BodyShape]:
-    """Return the known geometry by name."""
-    return {
-        body.name: BodyShape(np.array([[point.x, point.y] for point in body.footprint]), float(body.height))
-        for body in message.bodies
-    }
+    """Return the known geometry by name.
+
+    Raises:
+        BagError: a name that cannot be part of a topic, an outline that is none, or a number that is not finite.
+    """
+    known = bodies_of_scene("/scene", message)
+    return {name: BodyShape(body.footprint, body.height) for name, body in known.items()}
+
+
+def movable_from_msg(message: Scene) -> list[str]:
+    """Return the names of what can be moved; raise BagError as `bodies_from_msg` does."""
+    return [name for name, body in bodies_of_scene("/scene", message).items() if body.movable]
 
 
 def twist_from_msg(message: TwistStamped) -> tuple[str, PlanarTwist]:

@@ -6,6 +6,7 @@ import numpy as np
 from nav_msgs.msg import Odometry
 from pbrl_msgs.msg import Scene
 
+from pbrl_control.errors import ControlError
 from pbrl_control.planar import Array, yaw_of
 from pbrl_control.ros.conversions import seconds
 
@@ -17,8 +18,15 @@ def odometry_from_msg(message: Odometry) -> tuple[float, Array]:
 
 
 def room_from_msg(message: Scene) -> Array | None:
-    """Return the corners (k, 2) of the free floor in `world` [m]; None where it has no bounds."""
-    return np.array([[corner.x, corner.y] for corner in message.room]) if message.room else None
+    """Return the corners (k, 2) of the free floor in `world` [m]; None where it has no bounds.
+
+    Raises:
+        ControlError: they are fewer than three, or a number is not finite.
+    """
+    corners = np.array([[corner.x, corner.y] for corner in message.room])
+    if len(corners) and not (len(corners) > 2 and np.isfinite(corners).all()):
+        raise ControlError(f"/scene: room: expected three finite corners at least, got {len(corners)} of them")
+    return corners if len(corners) else None
 
 
 def fixed_from_msg(message: Scene) -> dict[str, Array]:

@@ -123,7 +123,7 @@ class PushNode(Node):
 
     def _subscribe(self) -> None:
         hear = self._diagnostics.subscribe
-        hear(Scene, "scene", self._on_scene, LATCHED)
+        hear(Scene, "scene", self._on_scene, LATCHED, refuses=(BagError, ControlError))
         hear(Grasps, "grasps", self._on_grasps, LATCHED)
         hear(Float64, "body_controller/share", self._on_share, NEWEST, needed=False)
         if self._course is not None or self._sampled is not None:

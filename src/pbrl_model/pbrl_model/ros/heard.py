@@ -10,6 +10,7 @@ from typing import Any
 
 from rclpy.serialization import deserialize_message
 
+from pbrl_bag.errors import BagError
 from pbrl_bag.roles import GRASPS_TOPIC, SCENE_TOPIC
 
 BEFORE = 3.0
@@ -33,8 +34,18 @@ class Message:
     data: bytes
 
     def decoded(self) -> Any:
-        """Return the message itself."""
-        return deserialize_message(self.data, self.kind)
+        """Return the message itself.
+
+        Raises:
+            BagError: its bytes are none of its type.
+        """
+        try:
+            return deserialize_message(self.data, self.kind)
+        except (RuntimeError, ValueError, MemoryError) as error:
+            kind, told = self.kind.__name__, " ".join(str(error).split())
+            raise BagError(
+                f"{self.topic}: expected a {kind}, got {len(self.data)} bytes that are none: {told}"
+            ) from None
 
     @property
     def stamp(self) -> float:
@@ -103,7 +114,10 @@ class Heard:
             notes = self._check_clock(message, stamp)
             self._last[message.topic] = stamp
             if message.topic == GRASPS_TOPIC:
-                self._note_grasps(message, stamp)
+                try:
+                    self._note_grasps(message, stamp)
+                except BagError as error:
+                    notes.append(str(error))
                 return notes
             self._recent.append((stamp, message))
             self._size += len(message.data)

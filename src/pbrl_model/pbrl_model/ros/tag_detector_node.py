@@ -22,6 +22,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
+from pbrl_bag.errors import BagError
+from pbrl_bag.geometry import bodies_of_scene
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
@@ -66,7 +68,7 @@ class TagDetectorNode(Node):
         self._found = 0
         self._diagnostics = Diagnostics(self, numbers=lambda: {"bodies found": self._found})
         hear = self._diagnostics.subscribe
-        hear(Scene, "scene", self._on_scene, LATCHED)
+        hear(Scene, "scene", self._on_scene, LATCHED, refuses=(BagError,))
         hear(TFMessage, "/tf_static", self._on_frames, FRAMES)
         reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
         pictures = QoSProfile(depth=2, reliability=reliability)  # a late picture is of no use
@@ -76,7 +78,7 @@ class TagDetectorNode(Node):
             hear(Image, f"{topic}/image_raw", partial(self._on_image, name), pictures)
 
     def _on_scene(self, message: Scene) -> None:
-        bodies = [body.name for body in message.bodies if body.movable]
+        bodies = [name for name, body in bodies_of_scene("/scene", message).items() if body.movable]
         try:
             self._reader = TagReader(self._sheet.dictionary, worn_tags(self._sheet, bodies))
         except ModelError as error:

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scipy.spatial.transform import Rotation
 
+from pbrl_bag.yaml_text import parse_yaml
 from pbrl_model.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -71,8 +71,8 @@ def load_tag_sheet(path: Path) -> TagSheet:
         ModelError: no such file, not YAML, a fault in it, or an id that is there twice; one line.
     """
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        data = parse_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
         raise ModelError(f"{path}: expected a readable YAML file, got {' '.join(str(error).split())}") from error
     try:
         sheet = TagSheet.model_validate(data)

@@ -91,7 +91,7 @@ def goal_from_pose(message: PoseStamped) -> Array:
     if frame != WORLD:
         raise NamoError(f"goal: expected it in frame {WORLD!r}, got {frame!r}; make {WORLD!r} RViz's fixed frame")
     p, q = message.pose.position, message.pose.orientation
-    length = math.sqrt(q.x**2 + q.y**2 + q.z**2 + q.w**2)
+    length = math.hypot(q.x, q.y, q.z, q.w)
     if not abs(length - 1.0) < UNIT:
         raise NamoError(f"goal: expected a quaternion of length 1, got length {length:.3g}")
     return checked_goal(np.array([p.x, p.y, yaw_of(np.array([q.x, q.y, q.z, q.w]))]))

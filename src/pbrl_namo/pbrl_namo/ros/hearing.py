@@ -13,6 +13,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
+from pbrl_bag.errors import BagError
 from pbrl_bag.names import relative
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_control.errors import ControlError
@@ -22,12 +23,14 @@ from pbrl_control.planar import Array
 from pbrl_control.ros.conversions import (
     bodies_from_msg,
     grips_from_msg,
+    movable_from_msg,
     posture_from_msg,
     tag_from_msg,
     wrench_from_msg,
 )
 from pbrl_control.ros.floor_conversions import odometry_from_msg
 from pbrl_control.ros.qos import LATCHED, NEWEST
+from pbrl_namo.errors import NamoError
 
 JOINT_STATES, SHARE = "/joint_states", "/body_controller/share"
 
@@ -63,7 +66,7 @@ class Hearing:
         self._bodies: dict[str, BodyShape] = {}
         self._share = 1.0
         hear = self._subscribe = diagnostics.subscribe
-        hear(Scene, "scene", self._on_scene, LATCHED)
+        hear(Scene, "scene", self._on_scene, LATCHED, refuses=(BagError, ControlError, NamoError))
         hear(Grasps, "grasps", self._on_grasps, LATCHED)
         hear(JointState, relative(JOINT_STATES), self._on_joints, NEWEST)
         hear(Odometry, "odom", self._on_odometry, NEWEST)
@@ -86,9 +89,8 @@ class Hearing:
 
     def _on_scene(self, message: Scene) -> None:
         self._bodies = bodies_from_msg(message)
-        for body in message.bodies:
-            if body.movable:
-                self._listen_to_tag(body.name)
+        for name in movable_from_msg(message):
+            self._listen_to_tag(name)
         self._scene(message)
 
     def _on_grasps(self, message: Grasps) -> None:

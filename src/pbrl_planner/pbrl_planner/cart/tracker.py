@@ -126,8 +126,8 @@ class CartTracker:
 
     def _take_cart(self) -> None:
         for name in sorted(set(self.held.values()) & set(self._movable)):
+            self.body = CartBody.of(pr2_with(self._movable[name]))
             self.cart = self._movable[name]
-            self.body = CartBody.of(pr2_with(self.cart))
 
     def _reading(self, source: str) -> CartSight | None:
         if source not in self._seen or self.cart is None:

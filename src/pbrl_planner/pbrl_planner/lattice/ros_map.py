@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from pbrl_bag.yaml_text import parse_yaml
 from pbrl_planner.errors import PlannerError
+from pbrl_planner.lattice.bare_png import PNG, bare_png
 from pbrl_planner.lattice.grid import DEAREST, LETHAL, MOST_CELLS, CostGrid
 
 LARGEST = 512 * 2**20
 """[bytes] of an image file."""
 HEAD = 4096
 """[bytes] in which a PGM says how large it is."""
-PNG = b"\x89PNG\r\n\x1a\n"
 KEYS = {"image", "mode", "resolution", "origin", "negate", "occupied_thresh", "free_thresh"}
 
 
@@ -117,16 +117,19 @@ def _number(path: Path, said: dict[str, Any], key: str, low: float, high: float,
 def _pixels(path: Path) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return an image's pixels (rows, columns), 0 to 255, colours averaged, and where it is transparent."""
     try:
+        if not path.is_file():  # a pipe would be waited for, a device read for ever
+            raise PlannerError(f"{path}: expected a readable PGM or PNG image, got no such file")
         with path.open("rb") as file:
             data = file.read(LARGEST + 1)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise PlannerError(f"{path}: expected a readable PGM or PNG image, got {error}") from error
     width, height = _size(path, data[:HEAD])
     if len(data) > LARGEST or not 1 <= width * height <= MOST_CELLS:
         raise PlannerError(f"{path}: expected an image of at most {MOST_CELLS} pixels, got {width} x {height}")
     try:
-        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:
+        whole = bare_png(data) if data.startswith(PNG) else data
+        image = cv2.imdecode(np.frombuffer(whole, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+    except (cv2.error, ValueError):
         image = None
     if image is None or image.shape[:2] != (height, width):
         raise PlannerError(f"{path}: expected a whole image of {width} x {height} pixels, got one that ends early")

@@ -23,6 +23,8 @@ MAP = "map"
 """The frame of goals, costmaps and paths (REP 105)."""
 UNIT = 0.01
 """By so much the length of a quaternion may differ from one."""
+FARTHEST = 1e5
+"""[m] from the origin of a frame; further away, numbers have no millimetres any more."""
 UPRIGHT = 0.05
 """Sine of the angle by which a pose on the floor may lean."""
 
@@ -40,14 +42,14 @@ def planar_pose(pose: Pose, what: str) -> Array:
         PlannerError: it does not, or is no pose.
     """
     p, q = pose.position, pose.orientation
-    length = math.sqrt(q.x**2 + q.y**2 + q.z**2 + q.w**2)
+    length = math.hypot(q.x, q.y, q.z, q.w)
     if not abs(length - 1.0) < UNIT:
         raise PlannerError(f"{what}: expected a quaternion of length 1, got length {length:.3g}")
     if math.hypot(q.x, q.y) > UPRIGHT:
         raise PlannerError(f"{what}: expected it upright on the floor, got one that leans")
     found = np.array([p.x, p.y, yaw_of(np.array([q.x, q.y, q.z, q.w]))])
-    if not np.isfinite(found).all():
-        raise PlannerError(f"{what}: expected finite x, y and heading, got {found}")
+    if not (np.isfinite(found).all() and np.abs(found[:2]).max() <= FARTHEST):
+        raise PlannerError(f"{what}: expected finite x and y within {FARTHEST:g} m, and a heading, got {found}")
     return found
 
 

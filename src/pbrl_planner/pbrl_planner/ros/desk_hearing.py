@@ -15,6 +15,8 @@ from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
+from pbrl_bag.errors import BagError
+from pbrl_bag.geometry import bodies_of_scene
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_control.ball_arm import JOINTS, BallArm, Strokes
 from pbrl_control.errors import ControlError
@@ -68,7 +70,7 @@ class DeskHearing:
         self._stamps: dict[str, float] = {}
         hear = self._subscribe = diagnostics.subscribe
         hear(String, "robot_description", self._on_description, LATCHED)
-        hear(Scene, "scene", self._on_scene, LATCHED)
+        hear(Scene, "scene", self._on_scene, LATCHED, refuses=(BagError,))
         hear(TFMessage, "/tf_static", self._on_frames, FRAMES)
         hear(JointState, "joint_states", self._on_joints, NEWEST)
         if camera:
@@ -121,6 +123,7 @@ class DeskHearing:
         self._description, self._arm, self._desk = message.data, None, None
 
     def _on_scene(self, message: Scene) -> None:
+        bodies_of_scene("/scene", message)  # raises where it is none
         self._scene, self._desk, self._finder = message, None, None
         self._seen, self._stamps = {}, {}
         if not self._camera:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from pbrl_msgs.msg import Grasps, Scene
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
+from pbrl_bag.errors import BagError
+from pbrl_bag.geometry import bodies_of_scene
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_control.ros.conversions import seconds
 from pbrl_control.ros.qos import LATCHED
@@ -43,8 +44,8 @@ class Hearing:
         hear = diagnostics.subscribe
         hear(Odometry, "odom", self._on_odometry, STREAM)
         hear(PoseWithCovarianceStamped, "amcl_pose", self._on_pose, STREAM)
-        hear(Scene, "scene", self._on_scene, LATCHED)
-        hear(Grasps, "grasps", self._on_grasps, LATCHED)
+        hear(Scene, "scene", self._on_scene, LATCHED, refuses=(BagError, PlannerError))
+        hear(Grasps, "grasps", self._on_grasps, LATCHED, refuses=(PlannerError,))
         for source in SOURCES:  # one of them will do
             hear(PoseStamped, f"cart_pose/{source}", partial(self._on_cart, source), STREAM, needed=False)
 
@@ -67,10 +68,8 @@ class Hearing:
             self._warn(error)
 
     def _on_scene(self, message: Scene) -> None:
-        outlines = {
-            body.name: np.array([[p.x, p.y] for p in body.footprint]) for body in message.bodies if body.movable
-        }
-        self._tracker.furniture(outlines)
+        known = bodies_of_scene("/scene", message)
+        self._tracker.furniture({name: body.footprint for name, body in known.items() if body.movable})
 
     def _on_grasps(self, message: Grasps) -> None:
         self._tracker.grasps({grasp.gripper: grasp.object for grasp in message.grasps})
