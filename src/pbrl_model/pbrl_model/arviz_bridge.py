@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import suppress
 from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
@@ -115,7 +116,8 @@ def _write(data: Any, path: Path) -> None:
         data.to_netcdf(str(unfinished))
         unfinished.replace(path)
     except (OSError, ValueError) as error:  # netCDF has no text with a zero in it
-        unfinished.unlink(missing_ok=True)
+        with suppress(OSError):  # where the folder is none, there is nothing to be taken away
+            unfinished.unlink()
         raise ModelError(f"{path}: expected to write a posterior there, got {' '.join(str(error).split())}") from None
 
 

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 import rclpy
-from geometry_msgs.msg import PoseStamped, Quaternion, Transform, TransformStamped, Vector3
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, Transform, TransformStamped, Vector3
 from pbrl_msgs.msg import Body, Scene
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -117,7 +117,9 @@ def test_pictures_in_poses_out(context):
     frames = client.create_publisher(TFMessage, "/tf_static", LATCHED)
     info = client.create_publisher(CameraInfo, "/camera/overhead_0/camera_info", 2)
     image = client.create_publisher(Image, "/camera/overhead_0/image_raw", 2)
-    scene.publish(Scene(bodies=[Body(name="pillar"), Body(name="desk", movable=True)]))
+    outline = [Point(x=x, y=y) for x, y in ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))]
+    bodies = [Body(name="pillar", footprint=outline), Body(name="desk", footprint=outline, movable=True)]
+    scene.publish(Scene(bodies=bodies))
     place = TransformStamped(child_frame_id="overhead_0", transform=DOWN)
     place.header.frame_id = "world"
     frames.publish(TFMessage(transforms=[place]))

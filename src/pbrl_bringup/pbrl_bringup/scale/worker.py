@@ -47,7 +47,8 @@ class OneOfOurs(WorkerPlugin):
             WrongWorkerError: it has several threads, or other code.
         """
         check_worker(worker, self.code)
-        os.environ.update(dict.fromkeys(THREADS, "1"))  # before numba is loaded, which reads it once
+        if "numba" not in sys.modules:  # which reads it once, and refuses to compile where it is changed afterwards
+            os.environ.update(dict.fromkeys(THREADS, "1"))
 
 
 def check_worker(worker: Worker, code: str) -> None:
