@@ -63,7 +63,7 @@ def test_the_report_has_the_contract_s_form(found: Diagnosis) -> None:
         assert set(entry) == {"effect", "probability", "parameters", "where", "when", "direction"}
         for values in entry["parameters"].values():
             assert set(values) == {"mean", "sd", "unit"}
-    assert set(table["heldout"]) == {"rmse_position_m", "rmse_yaw_rad", "log_score"}
+    assert set(table["heldout"]) == {"rmse_position_m", "rmse_yaw_rad", "rmse_position_retold_m", "log_score"}
     assert set(table["heldout"]["rmse_position_m"]) == {"baseline", "repaired", "noise_floor"}
     assert 0.0 <= sum(entry["probability"] for entry in table["effects"]) <= 1.0 + 1e-9
 

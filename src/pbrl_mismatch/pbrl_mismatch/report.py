@@ -176,7 +176,11 @@ def parameters_of(fitted: Fitted, columns: set[str] | None = None) -> dict[str, 
 
 
 def held_out_report(baseline: Fitted, repaired: Fitted, floor: tuple[float, float]) -> dict[str, Any]:
-    """Return errors on what was held out before and after the repair, with the noise floor beside them."""
+    """Return errors on what was held out before and after the repair, with the poses' noise beside them.
+
+    Errors are those of forecasts (`search.heldout.Score`); `rmse_position_retold_m` is what is left where the start of
+    each window and a steady wrench are fitted to it.
+    """
     before, after = baseline.score, repaired.score
 
     def entry(first: float | None, second: float | None, least: float) -> dict[str, float | None]:
@@ -187,6 +191,9 @@ def held_out_report(baseline: Fitted, repaired: Fitted, floor: tuple[float, floa
             before.rmse_position if before else None, after.rmse_position if after else None, floor[0]
         ),
         "rmse_yaw_rad": entry(before.rmse_yaw if before else None, after.rmse_yaw if after else None, floor[1]),
+        "rmse_position_retold_m": entry(
+            before.rmse_retold if before else None, after.rmse_retold if after else None, floor[0]
+        ),
         "log_score": {
             "baseline": _number(before.log_score if before else None),
             "repaired": _number(after.log_score if after else None),

@@ -48,7 +48,10 @@ def report(named: list[str], others: list[str], when: list[list[float]] | None =
         "effects": entries,
         "alternatives": [{"effect": name, "probability": 0.1, "when": None} for name in others],
         "unknown": False,
-        "heldout": {"rmse_position_m": {"baseline": 0.05, "repaired": 0.01, "noise_floor": None}},
+        "heldout": {
+            "rmse_position_m": {"baseline": 0.05, "repaired": 0.01, "noise_floor": None},
+            "rmse_position_retold_m": {"baseline": 0.012, "repaired": 0.006, "noise_floor": None},
+        },
     }
     return {"objects": {"table": told | more}}
 

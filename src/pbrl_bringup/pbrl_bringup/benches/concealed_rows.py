@@ -146,7 +146,8 @@ def _repaired(scores: Sequence[Score]) -> list[Row]:
     others = {name: _median(_rival(right, name, _ratio)) for name in _rivals(scores)}
     others |= {"oracle": _median(oracles)}
     others |= {"noise_floor": _median([each.before / each.floor for each in right if each.floor > 0.0])}
-    what = "held-out position error before over after, where named right"
+    others |= {"start_and_steady_wrench_fitted": _median([each.retold for each in right])}
+    what = "position error of held-out forecasts before over after, where named right"
     return [
         _middle(at_least, what, ratios, "1", 5.0, **others),
         _middle(at_least, "held-out gain as a share of a told oracle's, where noticed", gains, "1", 0.80),

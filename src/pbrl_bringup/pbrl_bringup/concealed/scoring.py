@@ -76,8 +76,9 @@ class Score:
         ranked: those and the alternatives, each once.
         unknown: whether it said so.
         overlap: intersection over union in time of effects that act in part of it, NaN where there is none to be found.
-        before: held-out position error of the baseline [m].
+        before: position error of the baseline's forecasts of what was held out [m].
         after: of the repair [m].
+        retold: error of the baseline over the repair's where windows' starts and a steady wrench are fitted to them.
         seconds: of the diagnosis, CPU.
         set: of cases.
         withheld: effects that the library did without.
@@ -119,6 +120,7 @@ class Score:
     moments: dict[str, float] = field(default_factory=dict)
     bias: dict[str, tuple[float, float]] = field(default_factory=dict)
     rivals: dict[str, RivalScore] = field(default_factory=dict)
+    retold: float = math.nan
     failed: str = ""
 
     @property
@@ -180,6 +182,7 @@ def score(
     named = tuple(each["effect"] for each in found["effects"])
     ranked = tuple(dict.fromkeys([*named, *(each["effect"] for each in found["alternatives"])]))
     errors = found["heldout"]["rmse_position_m"]
+    retold = [_number(found["heldout"]["rmse_position_retold_m"][which]) for which in ("baseline", "repaired")]
     told = oracle or Oracle()
     right = {each["effect"]: each for each in found["effects"] if each["effect"] in truth.effects}
     return Score(
@@ -208,6 +211,7 @@ def score(
         moments=_numbers({name: moment_error(name, truth, each) for name, each in right.items()}),
         bias={f"{n}.{p}": off for n, each in right.items() for p, off in parameter_bias(truth, each).items()},
         rivals={} if comparison is None else {each["rival"]: rival_score(truth, comparison, each) for each in claims},
+        retold=retold[0] / retold[1] if retold[1] > 0.0 else math.nan,
     )
 
 

@@ -20,9 +20,9 @@ from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import Fitted
-from pbrl_mismatch.search.heldout import errors, settle
+from pbrl_mismatch.search.heldout import errors
 from pbrl_mismatch.search.hypothesis import Hypothesis
-from pbrl_mismatch.search.objective import NUISANCES, Objective
+from pbrl_mismatch.search.objective import Objective
 
 Array = NDArray[np.float64]
 WrenchOf = Callable[[Array], Array]
@@ -31,7 +31,7 @@ WrenchOf = Callable[[Array], Array]
 KNOT = 0.1
 """Between knots of a wrench that is added to a simulation [s]."""
 ROUNDS = 4
-"""Of: simulate, ask for the wrench along the way that came out, settle the unknown start."""
+"""Of: simulate, ask for the wrench along the way that came out."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Claim:
         rival: its name.
         when: intervals in which the baseline is wrong [s].
         regimes: names of the regimes in which it is wrong, by axis; axes that are missing follow from `when`.
-        heldout: position error of its prediction of what was held out [m]; NaN where nothing could be.
+        heldout: position error of its forecasts of what was held out [m]; NaN where nothing could be.
         seconds: of CPU, beside the baseline's fit, which all share.
         notes: what must not be read into it.
     """
@@ -147,10 +147,10 @@ def _refitted(fitted: Fitted, kept: Cuts, options: DiagnoseOptions) -> Array:
 
 
 def heldout_error(given: Given, wrench_of: WrenchOf) -> float:
-    """Return the position error [m] of the baseline with a wrench added, over what was held out.
+    """Return the position error [m] of forecasts by the baseline with a wrench added, over what was held out.
 
-    The wrench is asked for along the simulated way, which depends on it: simulate, ask, simulate. The unknown start of
-    each window and the sensor's own error are settled as they are for the baseline.
+    Forecasts begin as a diagnosis's do (`search.heldout.Score`). The wrench is asked for along the simulated way, which
+    depends on it: simulate, ask, simulate. Of these rounds the best in each window counts, which flatters a rival.
 
     Args:
         given: what a rival works on.
@@ -159,34 +159,20 @@ def heldout_error(given: Given, wrench_of: WrenchOf) -> float:
     cuts = given.heldout
     if cuts is None:
         return float("nan")
-    objective = Objective(given.hypothesis, cuts, given.floor)
-    z = settle(objective, given.coordinates)
-    spread = objective.linearise(given.coordinates, z).spread[0]
-    row, gyration = given.row[None], cuts.track.gyration
     limit = 2.0 * np.abs(given.residual.body).max(axis=0) + 1e-9
     added = np.clip(wrench_of(_window_states(given)), -limit, limit).reshape(len(cuts), -1, 3)
     best = np.full(len(cuts), np.inf)
-    kept = np.zeros((1, len(cuts), spread.shape[1]))
+    kept = np.zeros((1, len(cuts), cuts.weight[0].size))
     for _ in range(ROUNDS):
-        told = cuts.told + np.einsum("wkl,wl->wk", cuts.root, z[0, :, :6])
-        bias = z[0, :, None, 6:] * objective.floor * np.array([1.0, 1.0, gyration])
-        found = poses(row, cuts, told[None], (added + bias)[None])
+        found = poses(given.row[None], cuts, cuts.told[None], added[None])
         off = cuts.pose - found[0]
         off[..., 2] -= 2.0 * np.pi * np.round(off[..., 2] / (2.0 * np.pi))
         residual = np.clip(np.nan_to_num(off * cuts.weight, nan=1e6), -1e6, 1e6).reshape(len(cuts), -1)
-        misfit = np.sum(residual**2, axis=1) + np.sum(z[0] ** 2, axis=1)
+        misfit = np.sum(residual**2, axis=1)
         better = misfit < best
         kept[0, better], best[better] = residual[better], misfit[better]
-        z = z + _step(residual, spread, z)
         added = np.clip(wrench_of(_simulated_states(given, found[0])), -limit, limit).reshape(len(cuts), -1, 3)
     return errors(kept, cuts)[0]
-
-
-def _step(residual: Array, spread: Array, z: Array) -> Array:
-    """Return the least-squares step (1, W, NUISANCES) of what is unknown in each window."""
-    across = np.swapaxes(spread, -1, -2)
-    pull = (across @ residual[..., None])[..., 0] - z[0]
-    return np.linalg.solve(across @ spread + np.eye(NUISANCES), pull[..., None])[None, ..., 0]
 
 
 def _knots(given: Given) -> int:

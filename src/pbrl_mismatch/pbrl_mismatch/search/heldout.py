@@ -22,17 +22,21 @@ REWEIGHED = 3
 
 @dataclass(frozen=True)
 class Score:
-    """Errors over held-out windows, their unknown starts estimated.
+    """What a fit says of held-out windows.
 
     Attributes:
-        log_score: log density of the held-out poses, parameters integrated out [nat], up to a constant of the windows.
-        rmse_position: [m].
-        rmse_yaw: [rad]; NaN where it was not seen.
+        log_score: log density of the held-out poses, starts and parameters integrated out [nat], up to a constant of
+            the windows.
+        rmse_position: of a forecast, simulated from the state that smoothing has at a window's start, under the felt
+            wrench; nothing is fitted to what is predicted [m].
+        rmse_yaw: of that forecast [rad]; NaN where yaw was not seen.
+        rmse_retold: of position where the start and a steady wrench are fitted to the window itself [m].
     """
 
     log_score: float
     rmse_position: float
     rmse_yaw: float
+    rmse_retold: float
 
 
 def settle(objective: Objective, coordinates: Array) -> Array:
@@ -74,10 +78,9 @@ def held_out_score(peak: Peak, row: int, cuts: Cuts, told: Cuts | None = None) -
     value = float(objective.likelihood(shifted[None])[0]) - 0.5 * float(reduced.log_det[0])
     value -= 0.5 * float(shift @ precision @ shift)
     value -= 0.5 * float(np.linalg.slogdet(np.eye(len(matrix)) + np.linalg.solve(precision, matrix))[1])
-    if told is None:
-        return Score(value, *errors(linear.residual, cuts))
-    longer = replace(objective, cuts=told)
-    return Score(value, *errors(longer.residual(u, settle(longer, u)), told))
+    longer = objective if told is None else replace(objective, cuts=told)
+    forecast = errors(longer.residual(u, longer.at_rest(1)), longer.cuts)
+    return Score(value, *forecast, errors(longer.residual(u, settle(longer, u)), longer.cuts)[0])
 
 
 def errors(residual: Array, cuts: Cuts) -> tuple[float, float]:
