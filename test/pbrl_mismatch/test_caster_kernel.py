@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
-from pbrl_mismatch.kernels.laws_kernel import roll_on
+from pbrl_mismatch.kernels.laws_kernel import roll_on, swivel
 
 
 def test_a_caster_s_bearing_rubs_by_how_much_faster_than_the_body_its_fork_turns() -> None:
@@ -21,10 +21,10 @@ def test_a_caster_s_bearing_rubs_by_how_much_faster_than_the_body_its_fork_turns
     angle = math.asin(trail * omega / math.hypot(*velocity))
     heading = math.atan2(velocity[1], velocity[0]) - angle
     twist = np.array([*(velocity - omega * np.array([-pivot[1], pivot[0]])), omega])
-    roll_on(row, heading, 100.0, *pivot, *velocity, omega, acc)
+    roll_on(row, math.cos(heading), math.sin(heading), 100.0, *pivot, *velocity, omega, acc)
     np.testing.assert_allclose(matrix_of(acc) @ twist, 0.0, atol=1e-9)
     acc[:] = 0.0
-    roll_on(row, heading + 0.5, 100.0, *pivot, *velocity, omega, acc)
+    roll_on(row, math.cos(heading + 0.5), math.sin(heading + 0.5), 100.0, *pivot, *velocity, omega, acc)
     assert np.hypot(*(matrix_of(acc) @ twist)[:2]) == pytest.approx(5.0, rel=1e-3)
 
 
@@ -33,9 +33,27 @@ def test_a_tread_that_rolls_while_it_turns_is_twisted_less(angle: float, share: 
     row, acc = neutral_row(), np.zeros(9)
     row[[COLUMN["caster_trail"], COLUMN["caster_twist"], COLUMN["caster_lay"]]] = 0.03, 0.05, 0.015
     velocity = 0.2 * np.array([math.cos(angle), math.sin(angle)])
-    roll_on(row, 0.0, 100.0, 0.3, -0.2, *velocity, 0.0, acc)
+    roll_on(row, 1.0, 0.0, 100.0, 0.3, -0.2, *velocity, 0.0, acc)
     force = matrix_of(acc) @ np.array([*velocity, 0.0])
     np.testing.assert_allclose(force[:2], [0.0, 5.0 * min(share, 1.0)], atol=1e-2)
+
+
+@pytest.mark.parametrize("heading", [-3.0, -1.5, 0.0, 1e-9, 2.0, 3.14])
+def test_a_caster_turns_as_its_equation_of_motion_says(heading: float) -> None:
+    # Rolling without slip, the fork turns by the sine of what is left to turn, for each trail of way.
+    way, steps = 0.7, 20000
+    left = math.remainder(-heading, 2.0 * math.pi)
+    for _ in range(steps):
+        left -= math.sin(left) * way / steps
+    ex, ey = swivel(math.cos(heading), math.sin(heading), 1.0, 0.0, way)
+    assert math.hypot(ex, ey) == pytest.approx(1.0)
+    assert math.remainder(math.atan2(ey, ex) + left, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-3)
+    again = swivel(*swivel(math.cos(heading), math.sin(heading), 1.0, 0.0, 0.3), 1.0, 0.0, way - 0.3)
+    np.testing.assert_allclose(again, (ex, ey), atol=1e-5)
+
+
+def test_a_caster_that_is_pulled_straight_backwards_turns_over() -> None:
+    np.testing.assert_allclose(swivel(-1.0, 0.0, 1.0, 0.0, 20.0), (1.0, 0.0), atol=1e-4)
 
 
 def matrix_of(acc: np.ndarray) -> np.ndarray:

@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 LAW = 7
@@ -115,7 +117,7 @@ def wrench_at_plates(rotation: Array, yaw: float, approach: Array, grip: float, 
     out[3] = force[2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def axis_velocity(law: Array, memory: Array, force: float, dt: float) -> float:
     """Return the velocity [m/s or rad/s] of an axis that yields to a force; it comes back by and by from where it gave.
 

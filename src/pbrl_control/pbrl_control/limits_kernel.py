@@ -8,10 +8,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def velocity_range(
     last: Array,
     joints: Array,
@@ -51,7 +53,7 @@ def velocity_range(
         high[k + 2] = max(high[k + 2], -down)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def braked(way: float, acceleration: float, longest: float) -> float:
     """Return the speed v with v longest + v^2 / (2 acceleration) = way: it can go on and still stop in time."""
     if way <= 0.0:

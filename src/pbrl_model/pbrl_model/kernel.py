@@ -39,6 +39,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 GRAVITY = 9.81  # [m/s^2]
@@ -69,13 +71,13 @@ MASS, WHEEL_X, WHEEL_Y, WHEEL_THETA, MU_X, MU_Y, HINGE_X, HINGE_Y, HINGE_RADIUS,
 )
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def clamp(value: float, limit: float) -> float:
     """Return the value, brought into [-limit, limit]."""
     return min(max(value, -limit), limit)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def cos_sin(angle: float) -> tuple[float, float]:
     """Return cosine and sine, both within 2.3e-16 for angles up to 1e6 rad, by multiplications and choices alone.
 
@@ -96,7 +98,7 @@ def cos_sin(angle: float) -> tuple[float, float]:
     return c * (sign * (1.0 - 2.0 * odd)), s * sign
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def box_impulses(
     a00: float, a01: float, a11: float, b0: float, b1: float, limit0: float, limit1: float
 ) -> tuple[float, float]:
@@ -128,7 +130,7 @@ def box_impulses(
     return p0, clamp(-(b1 + a01 * p0) / a11, limit1)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def joint_rows(
     dx: float, dy: float, rx: float, ry: float, radius: float, inverse_mass: float, inverse_inertia: float
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
@@ -163,7 +165,7 @@ def joint_rows(
     return 1.0, 0.0, -ry, 0.0, 1.0, rx, k11 * scale, -k01 * scale, k00 * scale, dx, dy
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def integrate(
     parameters: Array,
     initial: Array,

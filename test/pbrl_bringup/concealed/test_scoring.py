@@ -194,7 +194,7 @@ def test_rows_say_what_was_measured() -> None:
     assert rows["single: effect among the first two, share of 3 recordings"].value == pytest.approx(2 / 3)
     strong = rows["single: effect named first at 3 times the detectable strength, share of 1 recordings"]
     assert strong.value == 1.0 and strong.holds and strong.against["weaker_than_an_oracle_detects"] == 1
-    what = "held-out position error before over after, where named right, median of 1"
+    what = "position error of held-out forecasts before over after, where named right, median of 1"
     assert rows[what].value == pytest.approx(5.0) and rows[what].against["LISDD"] == pytest.approx(1.25)
     assert rows["withheld: unknown, or a name that predicts as well as the oracle, share of 1 recordings"].value == 1.0
     time = rows["localisation F1 (time) of effects that act for part of the time, mean of 2"]

@@ -8,12 +8,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 Byte = NDArray[np.uint8]
 Int = NDArray[np.int64]
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def place(corners: Array, on_cart: Byte, grip: Array, pose: Array, placed: Array) -> None:
     """Write corners (c, 2) at a pose (4,) into `placed` (c, 2) [m]."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -25,7 +27,7 @@ def place(corners: Array, on_cart: Byte, grip: Array, pose: Array, placed: Array
         placed[k, 0], placed[k, 1] = pose[0] + c * x - s * y, pose[1] + s * x + c * y
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def square_to_segment(x: float, y: float, half: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Return the squared distance of a segment from a square about x, y that it does not cross."""
     nearest = math.inf
@@ -44,7 +46,7 @@ def square_to_segment(x: float, y: float, half: float, ax: float, ay: float, bx:
     return nearest
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def square_to_ring(x: float, y: float, half: float, ring: Array) -> float:
     """Return the distance of a square about x, y from a convex outline (k, 2); 0 where they overlap or touch."""
     apart = False

@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 
@@ -26,7 +28,7 @@ def sample(times: Array, poses: Array, at: Array, found: Array) -> None:
                 found[k, j] = poses[after - 1, j] + share * (poses[after, j] - poses[after - 1, j])
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def limit_rates(
     wish: Array,
     last: Array,

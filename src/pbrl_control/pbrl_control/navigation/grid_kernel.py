@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -197,7 +199,7 @@ def _push(keys: Array, states: Index, count: int, key: float, state: int) -> tup
     return keys, states, count + 1
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def _pop(keys: Array, states: Index, count: int) -> tuple[float, int, int]:
     key, state = keys[0], states[0]
     count -= 1

@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 UNKNOWNS = 17
@@ -126,7 +128,7 @@ def lay_program(
     return reach
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def _add_square(hessian: Array, linear: Array, row: Array, target: float) -> None:
     """Add (row x - target)^2 / 2."""
     for i in range(UNKNOWNS):

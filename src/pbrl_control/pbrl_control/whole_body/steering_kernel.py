@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 
@@ -98,7 +100,7 @@ def steer(
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def _lay_way(carried: Array, twist: Array, step: float, way: Array) -> None:
     """Write the poses (n, 3) of the carried frame to come, in axes of the base now: a constant body twist."""
     turn = twist[2] * step
@@ -116,7 +118,7 @@ def _lay_way(carried: Array, twist: Array, step: float, way: Array) -> None:
         way[k, 0], way[k, 1], way[k, 2] = x, y, yaw
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def _step(pose: Array, v: float, w: float, step: float, out: Array) -> None:
     middle = pose[2] + 0.5 * w * step
     out[0] = pose[0] + v * step * math.cos(middle)
@@ -124,7 +126,7 @@ def _step(pose: Array, v: float, w: float, step: float, out: Array) -> None:
     out[2] = pose[2] + w * step
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def _roll(plan: Array, way: Array, home: Array, plain: Array, weights: Array, step: float, path: Array) -> float:
     """Write the path of a plan and return its cost."""
     cost = 0.0

@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 CREEP = 1e-3
@@ -20,7 +22,7 @@ SETTLING = 0.02
 """Time in which a contact's or a cord's oscillation is damped [s]: damping over stiffness."""
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def push(acc: Array, rx: float, ry: float, fx: float, fy: float) -> None:
     """Add a force (fx, fy) [N] at the lever (rx, ry) [m]."""
     acc[0] += fx
@@ -28,7 +30,7 @@ def push(acc: Array, rx: float, ry: float, fx: float, fy: float) -> None:
     acc[2] += rx * fy - ry * fx
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def resist(acc: Array, rx: float, ry: float, nx: float, ny: float, k: float) -> None:
     """Add a resistance k [N s/m] to the motion of the lever's end along the direction (nx, ny)."""
     lever = rx * ny - ry * nx

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP, SETTLING, push, resist
 from pbrl_mismatch.kernels.crate_kernel import HELD, ROUND, STIFFNESS, crate_contact, move_crate
@@ -17,7 +18,7 @@ from pbrl_mismatch.kernels.state import UNSEEN
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def contact(
     p: Array, outline: Array, state: Array, c: float, s: float, com: Array, qx: float, qy: float, radius: float
 ) -> tuple[float, float, float, float, float]:
@@ -28,7 +29,7 @@ def contact(
     return radius - gap, c * px - s * py, s * px + c * py, c * nx - s * ny, s * nx + c * ny
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def move_unseen(p: Array, outline: Array, state: Array, c: float, s: float, com: Array) -> None:
     """Let the unseen body slide away from a footprint that presses it harder than its friction holds."""
     if p[at.UNSEEN_ANGLE] > ROUND:
@@ -41,7 +42,7 @@ def move_unseen(p: Array, outline: Array, state: Array, c: float, s: float, com:
         state[UNSEEN + 1] += slid * ny
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def contacts(
     p: Array,
     state: Array,

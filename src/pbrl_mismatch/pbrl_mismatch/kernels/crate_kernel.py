@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import SETTLING
 from pbrl_mismatch.kernels.outline_kernel import nearest_edge
@@ -37,7 +38,7 @@ HELD = 0.999
 Pressed = tuple[float, float, float, float, float, float, float, float, float]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def pressed(p: Array, outline: Array, state: Array, c: float, s: float, com: Array) -> Pressed:
     """Return what springs press on a crate and how stiff they are.
 
@@ -99,7 +100,7 @@ def pressed(p: Array, outline: Array, state: Array, c: float, s: float, com: Arr
     return fx, fy, fm, xx, xy, yy, xm, ym, mm
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def reach_of(outline: Array, com: Array) -> float:
     """Return how far the footprint reaches from the centre of mass [m]."""
     most = 0.0
@@ -108,14 +109,14 @@ def reach_of(outline: Array, com: Array) -> float:
     return math.sqrt(most)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def share_of_friction(p: Array, fx: float, fy: float, fm: float) -> float:
     """Return how near a wrench is to what makes the crate slide: one is there."""
     lever = LEVER * p[at.UNSEEN_RADIUS]
     return math.sqrt(fx * fx + fy * fy + fm * fm / (lever * lever)) / p[at.UNSEEN_FORCE]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def move_crate(p: Array, outline: Array, state: Array, c: float, s: float, com: Array) -> None:
     """Let the crate slide and turn away from a footprint that presses it harder than its friction holds."""
     spin = 1.0 / (LEVER * p[at.UNSEEN_RADIUS]) ** 2
@@ -135,7 +136,7 @@ def move_crate(p: Array, outline: Array, state: Array, c: float, s: float, com: 
         state[UNSEEN + 2] += way * dm
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def crate_contact(
     p: Array, outline: Array, state: Array, c: float, s: float, com: Array, dt: float, acc: Array
 ) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP, SETTLING, push, resist
 from pbrl_mismatch.kernels.own_kernel import how_many, own_laws
@@ -21,11 +22,16 @@ Array = NDArray[np.float64]
 
 BORDER = 0.01
 """A patch's border is so soft [m]: a foot has a width, and a fit needs a slope."""
+BACKWARDS, TURNS_OVER = -1.0 + 1e-7, 4000.0
+"""A caster whose turn has a cosine below this goes backwards, and still turns over: by so much of a tangent of half."""
+FOOT = 6
+"""Numbers of a foot that `lay_feet` writes: lever (x, y) [m], limit of its friction [N], load on it [N], cosine and
+sine of its caster's heading."""
 SWITCHING = 0.1
 """What begins at some moment comes on within this time [s]: a fit needs a slope."""
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def between(time: float, start: float, end: float) -> float:
     """Return 1 within an interval of time, 0 outside, with edges so soft that a fit has a slope."""
     if time < start - 0.5 * SWITCHING or time > end + 0.5 * SWITCHING:
@@ -33,10 +39,9 @@ def between(time: float, start: float, end: float) -> float:
     return min((time - start) / SWITCHING + 0.5, (end - time) / SWITCHING + 0.5, 1.0)
 
 
-@njit(cache=True, error_model="numpy")
-def patch_share(p: Array, x: float, y: float) -> float:
-    """Return how much a place on the floor belongs to the patch, 0..1."""
-    c, s = math.cos(p[at.PATCH_THETA]), math.sin(p[at.PATCH_THETA])
+@njit(**LEAF)
+def patch_share(p: Array, c: float, s: float, x: float, y: float) -> float:
+    """Return how much a place on the floor belongs to a patch of which cosine and sine of the turn are told, 0..1."""
     dx, dy = x - p[at.PATCH_X], y - p[at.PATCH_Y]
     along = (p[at.PATCH_LENGTH] - abs(c * dx + s * dy)) / BORDER
     across = (p[at.PATCH_WIDTH] - abs(-s * dx + c * dy)) / BORDER
@@ -45,16 +50,28 @@ def patch_share(p: Array, x: float, y: float) -> float:
     return 1.0 / ((1.0 + math.exp(-along)) * (1.0 + math.exp(-across)))
 
 
-@njit(cache=True, error_model="numpy")
-def swivel(heading: float, vx: float, vy: float, way: float) -> float:
-    """Return a caster's heading after its pivot has gone `way` trails along (vx, vy), exact for a straight way."""
-    turn = math.atan2(vy, vx) - heading
-    turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
-    half = min(max(0.5 * turn, -1.5705), 1.5705)  # one that goes straight backwards still has to turn over
-    return heading + turn - 2.0 * math.atan(math.tan(half) * math.exp(-way))
+@njit(**LEAF, forceinline=True)
+def swivel(ex: float, ey: float, ux: float, uy: float, way: float) -> tuple[float, float]:
+    """Return a caster's direction after its pivot has gone `way` trails along the unit vector (ux, uy).
+
+    Exact for a straight way: the tangent of half the angle that is left to turn shrinks by exp(-way).
+
+    Args:
+        ex: cosine of its heading.
+        ey: sine of it.
+        ux: direction of the pivot's velocity.
+        uy: as `ux`.
+        way: over the trail.
+    """
+    ahead, aside = ex * ux + ey * uy, ex * uy - ey * ux
+    half = aside / (1.0 + ahead) if ahead > BACKWARDS else math.copysign(TURNS_OVER, aside)
+    half *= math.exp(-way)
+    square = half * half
+    c, s = (1.0 - square) / (1.0 + square), 2.0 * half / (1.0 + square)
+    return c * ux + s * uy, c * uy - s * ux
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def springs(
     p: Array,
     state: Array,
@@ -122,15 +139,15 @@ def springs(
         own_laws(p, state, c, s, time, com, acc)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def on_casters(p: Array) -> bool:
     """Tell whether the feet are casters."""
     return p[at.CASTER_ROLL] > 0.0 or p[at.CASTER_SCRUB] > 0.0 or p[at.CASTER_TWIST] > 0.0
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def roll_on(
-    p: Array, heading: float, load: float, rx: float, ry: float, ux: float, uy: float, omega: float, acc: Array
+    p: Array, ex: float, ey: float, load: float, rx: float, ry: float, ux: float, uy: float, omega: float, acc: Array
 ) -> None:
     """Add what a trailing caster resists: the wheel's rolling, the tread's twist, and the bearing of the fork.
 
@@ -140,7 +157,8 @@ def roll_on(
 
     Args:
         p: (WIDTH,) parameter row.
-        heading: of the caster, world axes [rad].
+        ex: cosine of the caster's heading, world axes.
+        ey: its sine.
         load: on it [N].
         rx: lever of its pivot from the centre of mass [m].
         ry: as `rx`.
@@ -149,7 +167,7 @@ def roll_on(
         omega: of the body [rad/s].
         acc: (9,) account.
     """
-    ex, ey, trail = math.cos(heading), math.sin(heading), p[at.CASTER_TRAIL]
+    trail = p[at.CASTER_TRAIL]
     along, across = ux * ex + uy * ey, uy * ex - ux * ey
     resist(acc, rx, ry, ex, ey, p[at.CASTER_ROLL] * load / math.sqrt(along * along + CREEP * CREEP))
     if p[at.CASTER_SCRUB] > 0.0:
@@ -161,14 +179,14 @@ def roll_on(
         resist(acc, rx, ry, -ey, ex, p[at.CASTER_TWIST] * load / slip)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def dry(p: Array) -> bool:
     """Tell whether any dry friction of the effects is on: its limit depends on the velocity it leads to."""
     floor = p[at.SLIDE_MU] + p[at.BREAKAWAY_MU] + abs(p[at.PATCH_MU])
     return on_casters(p) or floor + p[at.WHEEL2_MU_X] + max(p[at.WHEEL2_MU_Y], 0.0) > 0.0
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def drag_wheel(
     c: float,
     s: float,
@@ -199,7 +217,7 @@ def drag_wheel(
     resist(acc, rx, ry, -ey, ex, across * across * scale)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def tilt(
     p: Array, c: float, s: float, fx: float, fy: float, weight: float, feet: Array
 ) -> tuple[float, float, float, float]:
@@ -220,10 +238,59 @@ def tilt(
     return ox, oy, x / xx, y / yy
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def resistances(
+@njit(**LEAF, forceinline=True)
+def on_feet(p: Array) -> bool:
+    """Tell whether the feet resist."""
+    return p[at.SLIDE_MU] > 0.0 or p[at.BREAKAWAY_MU] > 0.0 or p[at.PATCH_MU] != 0.0 or on_casters(p)
+
+
+@njit(**LEAF)
+def lay_feet(
     p: Array,
     state: Array,
+    c: float,
+    s: float,
+    mass: float,
+    com: Array,
+    feet: Array,
+    axes: Array,
+    acc: Array,
+    room: Array,
+) -> None:
+    """Write what every foot's friction takes from where the body is, not from how fast it goes, see `FOOT`.
+
+    Args:
+        p: see `springs`, and so are those not named here.
+        state: see `springs`.
+        c: see `springs`.
+        s: see `springs`.
+        mass: see `springs`.
+        com: see `springs`.
+        feet: (F, 2) points in the body's frame that share the load [m].
+        axes: (7,) see `fixed_axes`.
+        acc: (9,) account, of which the force tips the body.
+        room: (F, FOOT) written.
+    """
+    count = feet.shape[0]
+    even, ox, oy, gx, gy = mass * GRAVITY / count, 0.0, 0.0, 0.0, 0.0
+    rolls = on_casters(p)
+    if p[at.LOAD_X] != 0.0 or p[at.LOAD_Y] != 0.0 or p[at.LOAD_HEIGHT] > 0.0:
+        ox, oy, gx, gy = tilt(p, c, s, acc[0], acc[1], even * count, feet)
+    for i in range(count):
+        load = even * max(1.0 + gx * (feet[i, 0] - ox) + gy * (feet[i, 1] - oy), 0.0)
+        ax, ay = p[at.SLIDE_EXTENT] * feet[i, 0] - com[0], p[at.SLIDE_EXTENT] * feet[i, 1] - com[1]
+        rx, ry = c * ax - s * ay, s * ax + c * ay
+        mu = p[at.SLIDE_MU]
+        if p[at.PATCH_MU] != 0.0:
+            mu += p[at.PATCH_MU] * patch_share(p, axes[5], axes[6], state[0] + rx, state[1] + ry)
+        room[i, 0], room[i, 1], room[i, 2], room[i, 3] = rx, ry, mu * load, load
+        if rolls and i < CASTERS:
+            room[i, 4], room[i, 5] = state[FIRST_CASTER + 2 * i], state[FIRST_CASTER + 2 * i + 1]
+
+
+@njit(**LEAF, forceinline=True)
+def resistances(
+    p: Array,
     c: float,
     s: float,
     vx: float,
@@ -231,15 +298,14 @@ def resistances(
     omega: float,
     mass: float,
     com: Array,
-    feet: Array,
     axes: Array,
+    room: Array,
     acc: Array,
 ) -> None:
     """Add dry friction at every foot and at the second wheel.
 
     Args:
         p: see `springs`, and so are those not named here.
-        state: see `springs`.
         c: see `springs`.
         s: see `springs`.
         vx: velocity of the centre of mass at which the sliding speeds are taken [m/s].
@@ -247,34 +313,31 @@ def resistances(
         omega: [rad/s].
         mass: see `springs`.
         com: see `springs`.
-        feet: (F, 2) points in the body's frame that share the load [m].
-        axes: (5,) see `fixed_axes`.
+        axes: (7,) see `fixed_axes`.
+        room: (F, FOOT) see `lay_feet`; not read where the feet do not resist.
         acc: (9,) account.
     """
-    count = feet.shape[0]
-    load = mass * GRAVITY / count
-    slides = p[at.SLIDE_MU] > 0.0 or p[at.BREAKAWAY_MU] > 0.0
-    rolls = on_casters(p)
-    if slides or rolls or p[at.PATCH_MU] != 0.0:
-        even, ox, oy, gx, gy = load, 0.0, 0.0, 0.0, 0.0
-        if p[at.LOAD_X] != 0.0 or p[at.LOAD_Y] != 0.0 or p[at.LOAD_HEIGHT] > 0.0:
-            ox, oy, gx, gy = tilt(p, c, s, acc[0], acc[1], even * count, feet)
-        for i in range(count):
-            load = even * max(1.0 + gx * (feet[i, 0] - ox) + gy * (feet[i, 1] - oy), 0.0)
-            ax, ay = p[at.SLIDE_EXTENT] * feet[i, 0] - com[0], p[at.SLIDE_EXTENT] * feet[i, 1] - com[1]
-            rx, ry = c * ax - s * ay, s * ax + c * ay
+    if on_feet(p):
+        rolls, leaves = on_casters(p), p[at.BREAKAWAY_MU] > 0.0
+        straight, aside, ahead, turning = 0.0, 0.0, 0.0, 0.0
+        for i in range(room.shape[0]):
+            rx, ry, limit, load = room[i, 0], room[i, 1], room[i, 2], room[i, 3]
             ux, uy = vx - omega * ry, vy + omega * rx
             square = ux * ux + uy * uy
-            mu = p[at.SLIDE_MU]
-            if p[at.BREAKAWAY_MU] > 0.0:
-                mu += p[at.BREAKAWAY_MU] * math.exp(-square / p[at.BREAKAWAY_SPEED] ** 2)
-            if p[at.PATCH_MU] != 0.0:
-                mu += p[at.PATCH_MU] * patch_share(p, state[0] + rx, state[1] + ry)
-            k = mu * load / math.sqrt(square + CREEP * CREEP)
-            resist(acc, rx, ry, 1.0, 0.0, k)
-            resist(acc, rx, ry, 0.0, 1.0, k)
+            if leaves:
+                limit += load * p[at.BREAKAWAY_MU] * math.exp(-square / p[at.BREAKAWAY_SPEED] ** 2)
+            k = limit / math.sqrt(square + CREEP * CREEP)
+            straight += k
+            aside -= k * ry
+            ahead += k * rx
+            turning += k * (rx * rx + ry * ry)
             if rolls and i < CASTERS:
-                roll_on(p, state[FIRST_CASTER + i], load, rx, ry, ux, uy, omega, acc)
+                roll_on(p, room[i, 4], room[i, 5], load, rx, ry, ux, uy, omega, acc)
+        acc[3] += straight
+        acc[5] += straight
+        acc[6] += aside
+        acc[7] += ahead
+        acc[8] += turning
     weight = mass * GRAVITY
     if p[at.WHEEL2_MU_X] > 0.0 or p[at.WHEEL2_MU_Y] > 0.0:
         ax, ay = p[at.WHEEL2_X] - com[0], p[at.WHEEL2_Y] - com[1]

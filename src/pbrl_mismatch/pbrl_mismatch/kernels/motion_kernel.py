@@ -12,9 +12,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.contact_kernel import move_unseen
-from pbrl_mismatch.kernels.laws_kernel import on_casters
+from pbrl_mismatch.kernels.laws_kernel import FOOT, on_casters
 from pbrl_mismatch.kernels.sense_kernel import acting, as_seen, load_now, to_truth
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH, STATE, UNSEEN
 from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body, swing_load, turn_casters
@@ -55,7 +56,8 @@ def rehearse_windows(
     dt, state = body[3], np.zeros(STATE)
     state[UNSEEN], state[UNSEEN + 1] = p[at.UNSEEN_X], p[at.UNSEEN_Y]
     for i in range(CASTERS):
-        state[FIRST_CASTER + i] = seen[0, 2] + p[at.CASTER_HEADING]
+        heading = seen[0, 2] + p[at.CASTER_HEADING]
+        state[FIRST_CASTER + 2 * i], state[FIRST_CASTER + 2 * i + 1] = math.cos(heading), math.sin(heading)
     stride, t, begin = 1 if swings else STRIDES, 0, 0
     for w in range(span.shape[0]):
         while True:
@@ -110,7 +112,8 @@ def simulate_window(
     `memory` (STATE,) is what `rehearse_windows` found.
     """
     state, com, acc, wrench = np.empty(STATE), np.empty(2), np.empty(9), np.empty(3)
-    before, after, axes = np.empty(3), np.empty(3), np.empty(5)
+    before, after, axes = np.empty(3), np.empty(3), np.empty(7)
+    room = np.empty((feet.shape[0], FOOT))
     first, steps, dt = span[FIRST], span[STEPS], body[3]
     knots = extra.shape[0] - 1
     mass, inertia = load_now(p, clock[first], body, com)
@@ -149,7 +152,7 @@ def simulate_window(
         due = n < poses and (place[n] <= k + 1 or k == steps - 1)
         if due:
             as_seen(p, state, com, before)
-        c, s = step_body(p, state, wrench, clock[t], mass, inertia, com, pivot, outline, feet, axes, acc, dt)
+        c, s = step_body(p, state, wrench, clock[t], mass, inertia, com, pivot, outline, feet, axes, acc, room, dt)
         if due:
             as_seen(p, state, com, after)
         while n < poses and (place[n] <= k + 1 or k == steps - 1):
@@ -261,7 +264,7 @@ def simulate_parallel(
             )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def step_seen(
     p: Array,
     state: Array,
@@ -279,6 +282,7 @@ def step_seen(
     com: Array,
     axes: Array,
     acc: Array,
+    room: Array,
     wrench: Array,
 ) -> None:
     """Move a true state (STATE,) from step `t` to the next with a wrench `extra` (3,) in world axes added."""
@@ -287,4 +291,4 @@ def step_seen(
     wrench[0] += extra[0]
     wrench[1] += extra[1]
     wrench[2] += extra[2]
-    step_body(p, state, wrench, clock[t], mass, inertia, com, pivot, outline, feet, axes, acc, body[3])
+    step_body(p, state, wrench, clock[t], mass, inertia, com, pivot, outline, feet, axes, acc, room, body[3])

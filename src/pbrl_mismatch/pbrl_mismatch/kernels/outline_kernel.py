@@ -8,10 +8,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def nearest_edge(outline: Array, bx: float, by: float) -> tuple[float, float, float, float, float]:
     """Return the signed distance of a point to a counter-clockwise polygon, the nearest point, and the normal there.
 

@@ -17,6 +17,8 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 _types: Any = types  # not all of it is typed
@@ -72,13 +74,13 @@ _entry: Any = intrinsic(_read)
 _call: Any = intrinsic(_ask)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def how_many() -> int:
     """Return how many laws there are."""
     return int(_entry(0))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def at_centre(
     address: int,
     told: int,
@@ -111,7 +113,7 @@ def at_centre(
     return fx, fy, tau - rx * fy + ry * fx
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def own_laws(p: Array, state: Array, c: float, s: float, time: float, com: Array, acc: Array) -> None:
     """Add what the laws do that are on.
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.contact_kernel import contacts, move_unseen
-from pbrl_mismatch.kernels.laws_kernel import springs
+from pbrl_mismatch.kernels.laws_kernel import FOOT, springs
 from pbrl_mismatch.kernels.motion_kernel import BEGIN, LAST, rehearse
 from pbrl_mismatch.kernels.sense_kernel import acting, load_now, to_truth
 from pbrl_mismatch.kernels.state import STATE
@@ -62,7 +62,7 @@ def accelerate_along(
         out: (P, ceil(T / stride), 3) [m/s^2, m/s^2, rad/s^2], written.
     """
     state, com, acc, wrench = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3)
-    axes, dt = np.empty(5), body[3]
+    axes, room, dt = np.empty(7), np.empty((feet.shape[0], FOOT)), body[3]
     for r in range(rows.shape[0]):
         p = rows[r]
         fixed_axes(p, REACTION, axes)
@@ -92,7 +92,7 @@ def accelerate_along(
             acc[2] -= acc[6] * vx + acc[7] * vy + acc[8] * omega
             acc[3:] = 0.0
             contacts(p, state, c, s, mass, com, pivot, outline, REACTION, acc)
-            _, _, _ = respond(p, state, c, s, mass, inertia, com, feet, axes, acc, REACTION)
+            _, _, _ = respond(p, state, c, s, mass, inertia, com, feet, axes, acc, room, REACTION)
             turn = (state[5] - omega) / REACTION
             out[r, n, 0] = (state[3] - vx) / REACTION - turn * ry - omega * omega * rx
             out[r, n, 1] = (state[4] - vy) / REACTION + turn * rx - omega * omega * ry

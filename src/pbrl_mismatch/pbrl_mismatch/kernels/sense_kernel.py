@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.laws_kernel import SWITCHING, between
 from pbrl_model.kernel import cos_sin
@@ -19,7 +20,7 @@ from pbrl_model.kernel import cos_sin
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def load_now(p: Array, time: float, body: Array, com: Array) -> tuple[float, float]:
     """Return mass [kg] and moment of inertia [kg m^2]; write the centre of mass in the body's frame (2,).
 
@@ -50,7 +51,7 @@ def load_now(p: Array, time: float, body: Array, com: Array) -> tuple[float, flo
     return mass, inertia
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def acting(
     p: Array,
     felt: Array,
@@ -115,10 +116,11 @@ def acting(
     out[2] = tau + ax * out[1] - ay * out[0]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def to_truth(p: Array, told: Array, body: Array, com: Array, state: Array) -> None:
     """Write where the true centre of mass is (6,) for a state of the nominal one as tags saw it (6,)."""
-    state[:6] = told[:6]
+    for k in range(6):
+        state[k] = told[k]
     c, s = math.cos(told[2]), math.sin(told[2])
     state[2] -= p[at.TAG_THETA]
     tc, ts = math.cos(state[2]), math.sin(state[2])
@@ -131,7 +133,7 @@ def to_truth(p: Array, told: Array, body: Array, com: Array, state: Array) -> No
     state[4] += told[5] * dx
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def as_seen(p: Array, state: Array, com: Array, out: Array) -> None:
     """Write the pose of the body's frame (3,) as tags would see it."""
     c, s = cos_sin(state[2])

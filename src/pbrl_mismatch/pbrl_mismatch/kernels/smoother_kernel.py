@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+from pbrl_mismatch.kernels.laws_kernel import FOOT
 from pbrl_mismatch.kernels.motion_kernel import LAST, rehearse, step_seen
 from pbrl_mismatch.kernels.sense_kernel import as_seen, load_now, to_truth
 from pbrl_mismatch.kernels.state import STATE
@@ -39,7 +41,7 @@ def correct(mean: Array, spread: Array, slope: Array, residual: float, variance:
     return -0.5 * (residual * residual / total + math.log(2.0 * math.pi * total))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def make_symmetric(spread: Array) -> None:
     """Take out of a covariance what rounding leaves beside its symmetric part: no observation would ever correct it."""
     for k in range(SIZE):
@@ -47,7 +49,7 @@ def make_symmetric(spread: Array) -> None:
             spread[i, k] = spread[k, i] = 0.5 * (spread[i, k] + spread[k, i])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def see(p: Array, mean: Array, com: Array, part: float, dt: float, state: Array, out: Array) -> None:
     """Write the pose (3,) that tags would see a share `part` of a step after a state."""
     for k in range(6):
@@ -112,7 +114,7 @@ def smooth_episode(
     _, _ = load_now(p, clock[first], body, com)
     to_truth(p, told, body, com, state)
     rehearse(p, seen, span, body, outline, feet, com, state)
-    axes = np.empty(5)
+    axes, room = np.empty(7), np.empty((feet.shape[0], FOOT))
     fixed_axes(p, dt, axes)
     kept = math.exp(-dt / memory)
     x, c = np.zeros(SIZE), np.zeros((SIZE, SIZE))
@@ -168,6 +170,7 @@ def smooth_episode(
                 com,
                 axes,
                 acc,
+                room,
                 wrench,
             )
             if i > 0:
@@ -233,7 +236,7 @@ def pushes_along(
         out: (P, ceil(T / stride), 3) change of velocity over a step, over dt [m/s^2, m/s^2, rad/s^2].
     """
     state, com, acc, wrench, extra = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3), np.zeros(3)
-    axes = np.empty(5)
+    axes, room = np.empty(7), np.empty((feet.shape[0], FOOT))
     for r in range(rows.shape[0]):
         p = rows[r]
         fixed_axes(p, body[3], axes)
@@ -259,6 +262,7 @@ def pushes_along(
                 com,
                 axes,
                 acc,
+                room,
                 wrench,
             )
             for k in range(3):

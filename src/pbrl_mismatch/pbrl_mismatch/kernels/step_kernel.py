@@ -13,10 +13,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP
 from pbrl_mismatch.kernels.contact_kernel import contacts, move_unseen
-from pbrl_mismatch.kernels.laws_kernel import dry, on_casters, resistances, springs, swivel
+from pbrl_mismatch.kernels.laws_kernel import dry, lay_feet, on_casters, on_feet, resistances, springs, swivel
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
 from pbrl_model.kernel import ERROR_BIAS, GRAVITY, SINGULAR, box_impulses, cos_sin, joint_rows
 
@@ -28,7 +29,7 @@ CONE_STEPS = 5
 """Newton steps to the edge of a friction ellipse."""
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def solve_resisted(state: Array, mass: float, inertia: float, acc: Array, dt: float) -> tuple[float, float, float]:
     """Return the velocity v of (M + dt D) v = M v0 + dt F, by Cholesky."""
     a, b, c = mass + dt * acc[3], dt * acc[4], dt * acc[6]
@@ -48,15 +49,19 @@ def solve_resisted(state: Array, mass: float, inertia: float, acc: Array, dt: fl
     return vx, vy, omega
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def fixed_axes(p: Array, dt: float, axes: Array) -> None:
-    """Write what no step changes (5,): cosines and sines of both wheels' turns, the share of a joint's error."""
+    """Write what no step changes (7,).
+
+    Cosines and sines of both wheels' turns, the share of a joint's error, cosine and sine of the patch's turn.
+    """
     axes[0], axes[1] = math.cos(p[at.WHEEL_THETA]), math.sin(p[at.WHEEL_THETA])
     axes[2], axes[3] = math.cos(p[at.WHEEL2_THETA]), math.sin(p[at.WHEEL2_THETA])
     axes[4] = (1.0 - ERROR_BIAS**dt) / dt
+    axes[5], axes[6] = math.cos(p[at.PATCH_THETA]), math.sin(p[at.PATCH_THETA])
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def cone_impulses(
     a00: float, a01: float, a11: float, b0: float, b1: float, limit0: float, limit1: float
 ) -> tuple[float, float]:
@@ -86,7 +91,7 @@ def cone_impulses(
     return q0 * limit0, q1 * limit1
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def hold(
     p: Array, state: Array, c: float, s: float, mass: float, inertia: float, com: Array, axes: Array, dt: float
 ) -> None:
@@ -148,19 +153,20 @@ def hold(
     state[3], state[4], state[5] = vx, vy, omega
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def turn_casters(p: Array, state: Array, c: float, s: float, com: Array, feet: Array, dt: float) -> None:
     """Let every trailing caster follow its pivot for one step."""
     for i in range(min(feet.shape[0], CASTERS)):
         ax, ay = feet[i, 0] - com[0], feet[i, 1] - com[1]
         ux = state[3] - state[5] * (s * ax + c * ay)
         uy = state[4] + state[5] * (c * ax - s * ay)
-        way = math.sqrt(ux * ux + uy * uy) * dt / p[at.CASTER_TRAIL]
-        if way > 0.1 * CREEP * dt / p[at.CASTER_TRAIL]:
-            state[FIRST_CASTER + i] = swivel(state[FIRST_CASTER + i], ux, uy, way)
+        speed, k = math.sqrt(ux * ux + uy * uy), FIRST_CASTER + 2 * i
+        if speed > 0.1 * CREEP:
+            way = speed * dt / p[at.CASTER_TRAIL]
+            state[k], state[k + 1] = swivel(state[k], state[k + 1], ux / speed, uy / speed, way)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def swing_load(
     p: Array, state: Array, ax: float, ay: float, turn: float, c: float, s: float, com: Array, dt: float
 ) -> None:
@@ -177,7 +183,7 @@ def swing_load(
         state[SLOSH + k] += state[SLOSH + 2 + k] * dt
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def respond(
     p: Array,
     state: Array,
@@ -189,6 +195,7 @@ def respond(
     feet: Array,
     axes: Array,
     acc: Array,
+    room: Array,
     dt: float,
 ) -> tuple[float, float, float]:
     """Change the velocity by what is in an account, by dry friction, and by the impulses of hinge and wheel.
@@ -204,6 +211,7 @@ def respond(
         feet: see `step_body`.
         axes: see `step_body`.
         acc: (9,) account, see `laws_kernel`.
+        room: (F, FOOT), see `laws_kernel.lay_feet`.
         dt: in which that happens [s].
 
     Returns:
@@ -211,10 +219,12 @@ def respond(
     """
     vx, vy, omega = state[3], state[4], state[5]
     if dry(p):
+        if on_feet(p):
+            lay_feet(p, state, c, s, mass, com, feet, axes, acc, room)
         b3, b4, b5, b6, b7, b8 = acc[3], acc[4], acc[5], acc[6], acc[7], acc[8]
         for _ in range(SWEEPS):
             acc[3], acc[4], acc[5], acc[6], acc[7], acc[8] = b3, b4, b5, b6, b7, b8
-            resistances(p, state, c, s, vx, vy, omega, mass, com, feet, axes, acc)
+            resistances(p, c, s, vx, vy, omega, mass, com, axes, room, acc)
             ux, uy, turn = vx, vy, omega
             vx, vy, omega = solve_resisted(state, mass, inertia, acc, dt)
             if abs(vx - ux) + abs(vy - uy) + abs(omega - turn) < SAME:
@@ -234,7 +244,7 @@ def respond(
     return ax, ay, turned
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def remember(
     p: Array,
     state: Array,
@@ -254,7 +264,7 @@ def remember(
         turn_casters(p, state, c, s, com, feet, dt)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def step_body(
     p: Array,
     state: Array,
@@ -268,6 +278,7 @@ def step_body(
     feet: Array,
     axes: Array,
     acc: Array,
+    room: Array,
     dt: float,
 ) -> tuple[float, float]:
     """Move a state (STATE,) one step on; return cosine and sine of its heading.
@@ -283,8 +294,9 @@ def step_body(
         pivot: (3,) see `contacts`.
         outline: (E, 2) footprint.
         feet: (F, 2) points that carry the load.
-        axes: (5,) see `fixed_axes`.
-        acc: (9,) room.
+        axes: (7,) see `fixed_axes`.
+        acc: (9,) written, see `account_kernel`.
+        room: (F, FOOT) written, see `laws_kernel.lay_feet`.
         dt: [s].
     """
     state[0] += state[3] * dt
@@ -297,6 +309,6 @@ def step_body(
     acc[3:] = 0.0
     springs(p, state, c, s, time, mass, com, dt, acc)
     contacts(p, state, c, s, mass, com, pivot, outline, dt, acc)
-    ax, ay, turned = respond(p, state, c, s, mass, inertia, com, feet, axes, acc, dt)
+    ax, ay, turned = respond(p, state, c, s, mass, inertia, com, feet, axes, acc, room, dt)
     remember(p, state, ax, ay, turned, c, s, com, feet, dt)
     return c, s

@@ -13,7 +13,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
+from pbrl_mismatch.kernels.laws_kernel import FOOT
 from pbrl_mismatch.kernels.motion_kernel import rehearse
 from pbrl_mismatch.kernels.sense_kernel import as_seen, load_now, to_truth
 from pbrl_mismatch.kernels.state import SLOSH, STATE
@@ -29,13 +31,13 @@ STIFFNESS, DAMPING, TURN_STIFFNESS, TURN_DAMPING, MOST_FORCE, MOST_TORQUE, GRIPP
 """Entries of a hand."""
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def reference_speed(time: float, duration: float, speed: float, ramp: float) -> float:
     """Return the speed of the reference [m/s]: up, steady, down."""
     return speed * max(0.0, min(1.0, time / ramp, (duration - time) / ramp))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def hold_back(force: Array, normal: Array, c: float, s: float, hand: Array) -> None:
     """Bring a hand's force and torque (3,) within what it can do; an open hand pushes within its friction cone.
 
@@ -59,7 +61,7 @@ def hold_back(force: Array, normal: Array, c: float, s: float, hand: Array) -> N
     force[2] = max(-hand[MOST_TORQUE], min(hand[MOST_TORQUE], force[2]))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(**LEAF, forceinline=True)
 def feel(p: Array, force: Array, c: float, s: float, time: float, out: Array) -> None:
     """Write what the sensor says (3,) of a force and torque at it (3,) in world axes: `acting`, the other way round."""
     tc, ts = math.cos(p[at.SENSOR_TURN]), math.sin(p[at.SENSOR_TURN])
@@ -91,7 +93,8 @@ def push_once(
 ) -> None:
     """Simulate one push under one parameter row, see `push_all`; its arguments without their first axes."""
     state, com, acc, force = np.empty(STATE), np.empty(2), np.empty(9), np.empty(3)
-    axes, pose, before, felt = np.empty(5), np.empty(3), np.empty(3), np.empty(3)
+    axes, pose, before, felt = np.empty(7), np.empty(3), np.empty(3), np.empty(3)
+    room = np.empty((feet.shape[0], FOOT))
     dt, segments = body[3], out.shape[0]
     steps = max(segments, round(duration / dt))
     mass, inertia = load_now(p, began, body, com)
@@ -124,7 +127,7 @@ def push_once(
             rx += direction[0] * way * dt
             ry += direction[1] * way * dt
         force[2] += lx * force[1] - ly * force[0]
-        c, s = step_body(p, state, force, time, mass, inertia, com, pivot, outline, feet, axes, acc, dt)
+        c, s = step_body(p, state, force, time, mass, inertia, com, pivot, outline, feet, axes, acc, room, dt)
         as_seen(p, state, com, pose)
         segment = k * segments // steps
         for j in range(3):

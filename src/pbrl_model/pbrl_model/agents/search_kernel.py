@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -22,7 +24,7 @@ NONE = -1
 TWO_PI = 2.0 * math.pi
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def separated(a: Array, count_a: int, b: Array, count_b: int, margin: float) -> bool:
     """Tell whether an edge of either convex polygon (k, 2) separates the two by `margin` [m] or more.
 
@@ -42,7 +44,7 @@ def separated(a: Array, count_a: int, b: Array, count_b: int, margin: float) -> 
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def stands_free(
     x: float,
     y: float,
@@ -92,7 +94,7 @@ def stands_free(
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def sectors_in_contact(
     x: float, y: float, theta: float, rays: Array, reach: float, obstacles: Array, obstacle_counts: Integers
 ) -> int:
@@ -127,7 +129,7 @@ def sectors_in_contact(
     return condition
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def crosses(ox: float, oy: float, dx: float, dy: float, polygon: Array, count: int) -> bool:
     """Tell whether the segment from o to o + d meets an edge of a polygon (k, 2)."""
     for i in range(count):
@@ -143,7 +145,7 @@ def crosses(ox: float, oy: float, dx: float, dy: float, polygon: Array, count: i
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def to_go(
     x: float, y: float, theta: float, goal: Array, field: Array, cell: Array, origin: Array, reach: float, turn: float
 ) -> float:
@@ -297,7 +299,7 @@ def search(
     return EXHAUSTED, best, expanded
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def at_goal(x: float, y: float, theta: float, goal: Array) -> bool:
     """Tell whether a pose is within the goal's tolerances."""
     if math.hypot(goal[0] - x, goal[1] - y) > goal[3]:
@@ -308,7 +310,7 @@ def at_goal(x: float, y: float, theta: float, goal: Array) -> bool:
     return abs(difference - TWO_PI * math.floor(difference / TWO_PI + 0.5)) <= goal[4]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def cell_of(x: float, y: float, theta: float, origin: Array, cell: Array, nx: int, ny: int, turns: int) -> int:
     """Return the flat index of a pose's cell, or NONE outside the grid."""
     i, j = math.floor((x - origin[0]) / cell[0]), math.floor((y - origin[1]) / cell[0])

@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_model import kernel
 from pbrl_model.engines import chipmunk_kernel as cp
 from pbrl_model.world import COLLISION_SLOP, LEVER, WALL_THICKNESS
@@ -69,7 +70,7 @@ class Room(NamedTuple):
     shapes: Index
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def add_wheel(space: int, body: int, row: Array, com: Array, realign: int, far_ends: Array, handles: Index) -> None:
     """Give a body the two joints of its wheel, each with a force of at most mu * mass * g; see `world.py`.
 
@@ -100,7 +101,7 @@ def add_wheel(space: int, body: int, row: Array, com: Array, realign: int, far_e
         handles[WHEEL_JOINT + axis] = joint
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def distance_joint(a: int, b: int, ax: float, ay: float, bx: float, by: float, radius: float) -> int:
     """Make a joint that keeps two anchors at a distance: a pin, or a pivot where it is zero."""
     if radius == 0.0:
@@ -110,7 +111,7 @@ def distance_joint(a: int, b: int, ax: float, ay: float, bx: float, by: float, r
     return joint
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def add_body(space: int, b: int, row: Array, state: Array, things: Things, realign: int, p: Whole, room: Room) -> None:
     """Put body `b` of world `p` with its shapes, wheel and hinge into a space.
 
@@ -147,7 +148,7 @@ def add_body(space: int, b: int, row: Array, state: Array, things: Things, reali
         handles[HINGE_JOINT] = joint
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def add_shape(space: int, shape: int, restitution: float, friction: float) -> None:
     """Put a shape into a space."""
     cp.shape_set_elasticity(shape, restitution)
@@ -155,7 +156,7 @@ def add_shape(space: int, shape: int, restitution: float, friction: float) -> No
     cp.space_add_shape(space, shape)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def add_walls(space: int, things: Things, p: Whole, room: Room) -> None:
     """Put the walls into the space of world `p`; their coefficients are 1, so that a body's own hold."""
     pieces = things.parts.size - 1
@@ -167,7 +168,7 @@ def add_walls(space: int, things: Things, p: Whole, room: Room) -> None:
         room.shapes[p, pieces + k] = shape
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def add_joins(space: int, things: Things, p: Whole, room: Room) -> None:
     """Join the bodies of world `p` that are to be kept at a distance."""
     bodies = things.com.shape[0]
@@ -187,7 +188,7 @@ def add_joins(space: int, things: Things, p: Whole, room: Room) -> None:
         room.handles[p, bodies + k, BODY] = joint
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def slow(body: int, loss: float, inertia_per_mass: float) -> None:
     """Take `loss` [m/s] from a body's speed in the metric of its inertia, all velocities by the same share."""
     vx, vy = cp.body_velocity(body)
@@ -198,7 +199,7 @@ def slow(body: int, loss: float, inertia_per_mass: float) -> None:
     cp.body_set_angular_velocity(body, omega * kept)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def read_state(body: int, out: Array) -> bool:
     """Write a body's (6,) state; tell whether the next pose will be finite, for Chipmunk ends the process where not."""
     out[0], out[1] = cp.body_position(body)
@@ -253,7 +254,7 @@ def roll_space(
                 slow(handles[b, BODY], rows[b, kernel.MU_GROUND] * kernel.GRAVITY * dt, inertia_per_mass[b])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def free_space(space: int, things: Things, p: Whole, room: Room) -> None:
     """Free the space of world `p`, then what it held: Chipmunk asks of its bodies while a space goes."""
     bodies = things.com.shape[0]

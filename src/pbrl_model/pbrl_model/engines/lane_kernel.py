@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_model.kernel import (
     ANCHOR_X,
     ANCHOR_Y,
@@ -63,7 +64,7 @@ SIZE = 38 * LANES
 """Length of the array that holds all lanes."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def kind_of(parameters: Array) -> int:
     """Return which loop a (12,) row of `KERNEL_COLUMNS` needs."""
     radius = parameters[HINGE_RADIUS]
@@ -72,7 +73,7 @@ def kind_of(parameters: Array) -> int:
     return WHEEL if parameters[MU_X] > 0.0 or parameters[MU_Y] > 0.0 else FREE
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def load_lane(
     lanes: Array,
     i: int,
@@ -128,7 +129,7 @@ def load_lane(
     lanes[LENGTH + i] = parameters[HINGE_RADIUS]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def fill_up(lanes: Array, count: int) -> int:
     """Copy the last of `count` lanes until whole vectors are full; return how many there are then."""
     full = (count + FULL - 1) // FULL * FULL
@@ -138,7 +139,7 @@ def fill_up(lanes: Array, count: int) -> int:
     return full
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def place_lanes(lanes: Array, count: int) -> None:
     """Work out the poses that are written."""
     for i in range(count):
@@ -147,13 +148,13 @@ def place_lanes(lanes: Array, count: int) -> None:
         lanes[OUT_Y + i] = lanes[Y + i] - s * x - c * y
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def joint_correction(dt: float) -> float:
     """Return the share of a joint's error that goes in a step, over the step [1/s]: Chipmunk's Baumgarte term."""
     return (1.0 - ERROR_BIAS**dt) / dt
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def step_lanes(
     lanes: Array, count: int, kind: int, slides: bool, body_wrench: bool, dt: float, correction: float
 ) -> None:
@@ -182,7 +183,7 @@ def step_lanes(
         slow_lanes(lanes, count)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def advance_lanes(lanes: Array, count: int, dt: float) -> None:
     """Advance poses with the velocities of the step before."""
     for i in range(count):
@@ -193,7 +194,7 @@ def advance_lanes(lanes: Array, count: int, dt: float) -> None:
         lanes[C + i], lanes[S + i] = cos_sin(theta)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def turn_pushes(lanes: Array, count: int) -> None:
     """Turn forces from the bodies' axes into the world's."""
     for i in range(count):
@@ -201,7 +202,7 @@ def turn_pushes(lanes: Array, count: int) -> None:
         lanes[FX + i], lanes[FY + i] = c * fx - s * fy, s * fx + c * fy
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def push_lanes(lanes: Array, count: int, dt: float) -> None:
     """Let forces and torques change velocities."""
     for i in range(count):
@@ -210,7 +211,7 @@ def push_lanes(lanes: Array, count: int, dt: float) -> None:
         lanes[OMEGA + i] += lanes[TAU + i] * lanes[INVERSE_INERTIA + i] * dt
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def wheel_lanes(lanes: Array, count: int) -> None:
     """Let wheels hold or slip: `kernel.box_impulses` with all divisions done beforehand."""
     for i in range(count):
@@ -229,7 +230,7 @@ def wheel_lanes(lanes: Array, count: int) -> None:
         lanes[OMEGA + i] = omega + (lever0 * p0 + lever1 * p1) * lanes[INVERSE_INERTIA + i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def rod_lanes(lanes: Array, count: int, correction: float) -> None:
     """Let joints of a length act, then wheels seen through them: a joint is unlimited.
 
@@ -268,7 +269,7 @@ def rod_lanes(lanes: Array, count: int, correction: float) -> None:
         lanes[OMEGA + i] = omega + (lever0 * p0 + lever1 * p1 + lever * j) * inverse_inertia
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def pivot_lanes(lanes: Array, count: int, correction: float) -> None:
     """Let joints of length zero act, as two rows along the world's axes, then wheels seen through them."""
     for i in range(count):
@@ -311,7 +312,7 @@ def pivot_lanes(lanes: Array, count: int, correction: float) -> None:
         lanes[OMEGA + i] = omega + (lever0 * p0 + lever1 * p1 + rx * j1 - ry * j0) * inverse_inertia
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def slow_lanes(lanes: Array, count: int) -> None:
     """Take from each body's speed what friction on the floor takes, all velocities by the same share."""
     for i in range(count):

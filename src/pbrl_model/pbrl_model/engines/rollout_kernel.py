@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_model.engines import lane_kernel as lk
 from pbrl_model.engines.lane_kernel import LANES
 
@@ -21,7 +22,7 @@ KIND, FIRST, COUNT, ROWS, AMONG = range(5)
 of this kind start in the order of rows, how many rows are of this kind."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def plan_groups(parameters: Array, windows: int, order: Index, plan: Index) -> int:
     """Sort rows by kind and share out their (row, window) pairs among groups of lanes; return the number of groups.
 
@@ -50,7 +51,7 @@ def plan_groups(parameters: Array, windows: int, order: Index, plan: Index) -> i
     return groups
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def write_lanes(lanes: Array, pair: Index, steps: Index, t: int, out: Array) -> None:
     """Write step `t` of every lane whose window has not ended.
 

@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_model.engines import lane_kernel as lk
 from pbrl_model.engines.lane_kernel import LANES
 from pbrl_model.engines.rollout_kernel import AMONG, COUNT, FIRST, KIND, KINDS, ROWS, plan_groups
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def force_lane(lanes: Array, i: int, now: Array, offset: Array, late: float, lever: float) -> None:
     """Push lane `i` by what acts in this step (8,) and by what is left out (3,), constant in the body's axes."""
     c, s = now[6], now[7]
@@ -33,7 +34,7 @@ def force_lane(lanes: Array, i: int, now: Array, offset: Array, late: float, lev
     lanes[lk.TAU + i] = now[2] - late * now[5] + lever * offset[2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def keep_lanes(lanes: Array, count: int, t: int, path: Array) -> None:
     """Write the poses of `count` lanes at step `t` into `path` (T + 1, 3, LANES)."""
     lk.place_lanes(lanes, count)
@@ -41,7 +42,7 @@ def keep_lanes(lanes: Array, count: int, t: int, path: Array) -> None:
         path[t, 0, i], path[t, 1, i], path[t, 2, i] = lanes[lk.OUT_X + i], lanes[lk.OUT_Y + i], lanes[lk.THETA + i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def read_path(path: Array, i: int, steps: int, place: Array, out: Array) -> None:
     """Write lane `i`'s poses at recorded places (N,) [steps], straight between steps, into `out` (N, 3)."""
     for n in range(place.shape[0]):
@@ -51,7 +52,7 @@ def read_path(path: Array, i: int, steps: int, place: Array, out: Array) -> None
             out[n, k] = path[before, k, i] + share * (path[before + 1, k, i] - path[before, k, i])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def simulate_starts(
     parameters: Array,
     start: Array,
@@ -96,7 +97,7 @@ def simulate_starts(
         read_path(path, i, steps, place, out[i])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def simulate_group(
     group: Index,
     order: Index,
@@ -136,7 +137,7 @@ def simulate_group(
         read_path(path, i, steps[w], place[w], out[p, w])
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(**LEAF, nogil=True)
 def run_serial(
     parameters: Array,
     initial: Array,

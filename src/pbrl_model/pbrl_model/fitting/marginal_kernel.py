@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_model.engines.lane_kernel import LANES, SIZE
 from pbrl_model.engines.window_kernel import simulate_starts
 from pbrl_model.kernel import HINGE_RADIUS
@@ -33,7 +34,7 @@ SHORTER, SHORTEST = 0.4, 0.05
 """A step towards the most likely nuisances that gains nothing is shortened, down to this share, then given up."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def factorise(matrix: Array) -> float:
     """Replace the lower triangle of a positive definite matrix by its Cholesky factor; return its log determinant."""
     log_det = 0.0
@@ -50,7 +51,7 @@ def factorise(matrix: Array) -> float:
     return log_det
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def solve_lower(factor: Array, vector: Array) -> float:
     """Replace b by L^-1 b for a lower triangle L; return the square of the answer."""
     square = 0.0
@@ -63,7 +64,7 @@ def solve_lower(factor: Array, vector: Array) -> float:
     return square
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def solve_upper(factor: Array, vector: Array) -> None:
     """Replace b by L^-T b for a lower triangle L."""
     for i in range(vector.shape[0] - 1, -1, -1):

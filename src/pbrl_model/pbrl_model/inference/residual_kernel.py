@@ -8,10 +8,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(**LEAF, nogil=True)
 def whiten(poses: Array, observed: Array, noise: Array, out: Array) -> None:
     """Write (poses - observed) / noise, angles the shorter way round.
 
@@ -31,7 +33,7 @@ def whiten(poses: Array, observed: Array, noise: Array, out: Array) -> None:
             out[p, t, 2] = angle / noise[2]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(**LEAF, nogil=True)
 def sums_of_squares(poses: Array, observed: Array, noise: Array, out: Array) -> None:
     """Write the sums of squares (P,) of what `whiten` writes."""
     for p in range(poses.shape[0]):

@@ -15,6 +15,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 STEP = 5e-4
@@ -23,7 +25,7 @@ BACK = 0.5
 """Share of what the ball has gone into the box that is taken back in a look."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def _touch(bx: float, by: float, length: float, width: float) -> tuple[float, float, float, float, float]:
     """Return the point of a box nearest to the ball's middle, the normal into the box there, and the distance.
 
@@ -42,7 +44,7 @@ def _touch(bx: float, by: float, length: float, width: float) -> tuple[float, fl
     return bx, side * width, 0.0, -side, -left_y
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def twist_of(
     px: float, py: float, nx: float, ny: float, vx: float, vy: float, radius: float, mu: float
 ) -> tuple[float, float, float]:
@@ -79,7 +81,7 @@ def twist_of(
     return fx, fy, (px * fy - py * fx) / square
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def push(row: Array, half: Array, ball: float, path: Array, out: Array) -> None:
     """Push one box once.
 

@@ -17,13 +17,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_namo.manipulation.plane_kernel import box_gap, crosses, nearest_points, point_distance
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def find_gaps(
     own: Array,
     own_starts: Indices,
@@ -66,7 +67,7 @@ def find_gaps(
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def cut_off(
     count: int,
     gaps: Array,
@@ -127,7 +128,7 @@ def cut_off(
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def touches(x: float, y: float, radius: float, own: Array, own_starts: Indices) -> bool:
     """Say whether a disc about a point is in a thing."""
     for q in range(own_starts.shape[0] - 1):
@@ -136,7 +137,7 @@ def touches(x: float, y: float, radius: float, own: Array, own_starts: Indices) 
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def draw_track(pose: Array, twist: Array, way: float, point: Array, chord: float, track: Array) -> int:
     """Write where a point of a moving body has been, from now back to the start, and return how many points.
 

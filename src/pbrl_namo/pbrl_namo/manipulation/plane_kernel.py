@@ -11,6 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
@@ -39,7 +41,7 @@ def place(points: Array, pose: Array, out: Array) -> None:
         out[k, 0], out[k, 1] = pose[0] + c * x - s * y, pose[1] + s * x + c * y
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def separation(a: Array, a0: int, a1: int, b: Array, b0: int, b1: int) -> float:
     """Return the widest gap between two outlines along any edge's normal; below zero: how deep they overlap.
 
@@ -74,7 +76,7 @@ def foot(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> tu
     return ax + share * dx, ay + share * dy
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def nearest_points(a: Array, a0: int, a1: int, b: Array, b0: int, b1: int, out: Array) -> float:
     """Write the nearest points (2,), (2,) of two outlines into `out` (4,), a's first, and return their distance.
 
@@ -100,7 +102,7 @@ def nearest_points(a: Array, a0: int, a1: int, b: Array, b0: int, b1: int, out: 
     return math.sqrt(best)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def point_distance(px: float, py: float, b: Array, b0: int, b1: int) -> float:
     """Return the distance from a point to an outline; zero inside it."""
     best, inside = np.inf, b1 - b0 > 2
@@ -123,7 +125,7 @@ def box_gap(x: float, y: float, box: Array) -> float:
     return math.sqrt(dx * dx + dy * dy)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def crosses(ax: float, ay: float, bx: float, by: float, path: Array, p0: int, p1: int) -> int:
     """Return how often the segment a b crosses a polyline, the rows p0 to p1 of `path`, modulo two."""
     count = 0

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_namo.manipulation.plane_kernel import point_distance
 
 Array = NDArray[np.float64]
@@ -18,7 +19,7 @@ Marks = NDArray[np.int32]
 UNSEEN, ROOT = -2, -1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def mark(
     points: Array,
     starts: Indices,
@@ -95,7 +96,7 @@ def spread(counts: Counts, own: Counts, target: int, wanted: Indices, parents: M
                         left -= cell == there
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def in_sight(counts: Counts, own: Counts, a: int, b: int) -> bool:
     """Say whether all cells that the segment between the middles of two cells touches are free (Amanatides and Woo)."""
     columns = counts.shape[1]
@@ -120,7 +121,7 @@ def in_sight(counts: Counts, own: Counts, a: int, b: int) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def straightened(counts: Counts, own: Counts, parents: Marks, start: int, chain: Marks, corners: Marks) -> int:
     """Write the cells at the corners of a straightened way from a reached cell to the target; return how many.
 

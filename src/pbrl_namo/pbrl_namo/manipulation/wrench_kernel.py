@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_model.kernel import GRAVITY
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ SINGULAR = 1e-12
 """Share of a column's squared length that has to be left of it once others are taken off."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def grip_wrenches(
     physics: Array, twist: Array, rate: Array, contacts: Array, torque_arm: float, work: Array, out: Array
 ) -> None:
@@ -94,7 +95,7 @@ def grip_wrenches(
     share_among(needed, rows, limits, count, contacts, com_x, com_y, torque_arm, work, out)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def share_among(
     needed: Array,
     rows: Array,
@@ -141,7 +142,7 @@ def invert_sharing(n: float, sx: float, sy: float, s2: float, out: Array) -> Non
     out[0, 1] = out[1, 0] = -sx * sy / (n * n * left)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def least_total(needed: Array, rows: Array, limits: Array, count: int, metric: Array, work: Array, out: Array) -> None:
     """Write the total (3,) = needed - sum z_k rows_k, |z_k| <= limits_k, with the least total.metric.total."""
     for i in range(3):
@@ -188,7 +189,7 @@ def least_total(needed: Array, rows: Array, limits: Array, count: int, metric: A
                     out[i] = trial[i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def project_off(trial: Array, rows: Array, free: Array, frees: int, metric: Array, work: Array) -> bool:
     """Take off `trial` (3,) what some rows can do without bounds; their shares go to work[13]. False: they depend."""
     for n in range(frees):  # normal equations, by Gauss's elimination of a matrix that is symmetric and positive

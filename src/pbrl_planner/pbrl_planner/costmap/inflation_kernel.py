@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Byte = NDArray[np.uint8]
 Int = NDArray[np.int32]
 
@@ -57,7 +59,7 @@ def distances(lethal: Byte, found: Int) -> None:
                 last -= 1
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def spread(squared: Int, table: Byte, inscribed: int, cells: Byte) -> None:
     """Write costs by squared distance where they are more than what is there, 255 giving way to `inscribed` and more.
 

@@ -8,13 +8,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 Byte = NDArray[np.uint8]
 Int = NDArray[np.int64]
 PASSED, HIT = 1, 2
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def pass_through(ax: float, ay: float, bx: float, by: float, touched: Byte) -> None:
     """Mark the cells that a beam passes before the one it ends in.
 
@@ -49,7 +51,7 @@ def pass_through(ax: float, ay: float, bx: float, by: float, touched: Byte) -> N
             left_y -= 1
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def near_ring(x: float, y: float, ring: Array, margin: float) -> bool:
     """Say whether a point is in a simple polygon (k, 2), or at most a margin away from it."""
     inside = False
@@ -69,7 +71,7 @@ def near_ring(x: float, y: float, ring: Array, margin: float) -> bool:
     return inside or nearest <= margin * margin
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def near_any(x: float, y: float, corners: Array, first: Int, margin: float) -> bool:
     """Say whether a point is in one of several polygons, or near it: corners (c, 2), ring k from `first[k]` on."""
     found = False
@@ -78,7 +80,7 @@ def near_any(x: float, y: float, corners: Array, first: Int, margin: float) -> b
     return found
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def trace(
     ranges: Array,
     angle_min: float,
@@ -139,7 +141,7 @@ def trace(
     return own
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def believe(
     touched: Byte, time: float, hit: int, miss: int, most: int, evidence: Byte, looked: Byte, last: Array
 ) -> tuple[int, int]:
@@ -174,7 +176,7 @@ def believe(
     return taken, freed
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def forget(
     now: float, confirmed: int, fleeting: float, memory: float, evidence: Byte, looked: Byte, last: Array
 ) -> int:

@@ -8,10 +8,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Cells = NDArray[np.int8]
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def sample_map(
     cells: Cells,
     cell: float,

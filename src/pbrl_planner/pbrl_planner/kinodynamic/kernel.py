@@ -11,12 +11,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_model.kernel import cos_sin, integrate
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def advance(
     parameters: Array,
     inertia_per_mass: float,

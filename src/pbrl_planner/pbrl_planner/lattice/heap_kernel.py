@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Long = NDArray[np.int64]
 
 
@@ -28,7 +30,7 @@ def heap_push(heap: Long, size: int, entry: int) -> int:
     return size + 1
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def heap_pop(heap: Long, size: int) -> int:
     """Take the least entry out, which the caller has read from `heap[0]`. Return the new size."""
     size -= 1
@@ -37,7 +39,7 @@ def heap_pop(heap: Long, size: int) -> int:
     return size
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def heapify(heap: Long, size: int) -> None:
     """Make a heap of the first `size` entries."""
     for place in range((size - 2) >> 2, -1, -1):

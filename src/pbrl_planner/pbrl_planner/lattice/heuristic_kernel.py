@@ -11,6 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Int = NDArray[np.int32]
 Long = NDArray[np.int64]
 Byte = NDArray[np.uint8]
@@ -23,7 +25,7 @@ the limit."""
 are free again (-1: none), places used so far, cells settled."""
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def spread(
     cost: Byte,
     blocked: int,

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_planner.lattice.sweep_kernel import (
     ALL,
     NONE,
@@ -28,7 +29,7 @@ EXHAUSTED, BUDGET, FULL = range(3)
 """Places in `numbers`: the queue's first entry, entries in it, entries of the log."""
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def flood(
     first: Int,
     ahead: Int,

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_planner.lattice.heap_kernel import heap_pop, heap_push, heapify
 from pbrl_planner.lattice.sweep_kernel import SweepTables, is_free
 
@@ -37,7 +38,7 @@ WAITS = 1 << 15
 """Set in a state's record while it waits in the list of inconsistent states."""
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def improve(
     first: Int,
     step: Int,
@@ -197,7 +198,7 @@ def improve(
     return status
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def next_round(
     bins: int,
     toward: Int,

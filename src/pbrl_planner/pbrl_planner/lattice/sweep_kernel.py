@@ -15,6 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Int = NDArray[np.int32]
 Word = NDArray[np.uint64]
 Byte = NDArray[np.uint8]
@@ -58,7 +60,7 @@ class SweepTables(NamedTuple):
     stays_stamp: int
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def is_free(here: int, m: int, stride: int, tables: SweepTables) -> bool:
     """Say whether the sweep of move `m` from a cell is free.
 
@@ -77,7 +79,7 @@ def is_free(here: int, m: int, stride: int, tables: SweepTables) -> bool:
     return (tables.free[row, word, m] >> np.uint64(column & 63)) & np.uint64(1) != 0
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def move_word(row: int, word: int, m: int, tables: SweepTables) -> np.uint64:
     """Return the bits of where the sweep of move `m` is free, begun at 64 places side by side."""
     found = stay_word(row, word, tables.source[m], tables)
@@ -101,7 +103,7 @@ def move_word(row: int, word: int, m: int, tables: SweepTables) -> np.uint64:
     return ~taken_word(row + tables.border, (word << 6) + tables.border, pieces, tables.levels, ~found)
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def stay_word(row: int, word: int, b: int, tables: SweepTables) -> np.uint64:
     """Return the bits of where robot and cart may stand in bin `b`, at 64 places side by side."""
     if tables.stays_known[row, word, b] != tables.stays_stamp:
@@ -112,7 +114,7 @@ def stay_word(row: int, word: int, b: int, tables: SweepTables) -> np.uint64:
     return tables.stays_free[row, word, b]
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def taken_word(top: int, left: int, pieces: Int, levels: Word, taken: np.uint64) -> np.uint64:
     """Return the bits of where a set of cells, put at 64 places side by side, would meet something.
 
@@ -134,7 +136,7 @@ def taken_word(top: int, left: int, pieces: Int, levels: Word, taken: np.uint64)
     return taken
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def lay_out(cost: Byte, lethal: int, border: int, levels: Word) -> None:
     """Write the bits of the floor.
 
@@ -163,7 +165,7 @@ def lay_out(cost: Byte, lethal: int, border: int, levels: Word) -> None:
                 levels[level, row, word] = levels[level - 1, row, word] | beside
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def close_near(pieces: Int, border: int, levels: Word, closed: int, cost: Byte) -> None:
     """Write `closed` into the cells (rows, columns) of a grid from which a set of cells, cut up, meets something."""
     rows, columns = cost.shape
@@ -175,14 +177,14 @@ def close_near(pieces: Int, border: int, levels: Word, closed: int, cost: Byte) 
                     cost[row, (word << 6) + k] = closed
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def cover_all(rings: Array, resolution: float, margin: float, reach: int, mask: Byte) -> None:
     """Mark the cells that any of several convex outlines (n, k, 2) touches; see `cover`."""
     for k in range(len(rings)):
         cover(rings[k], resolution, margin, reach, mask)
 
 
-@njit(cache=True)
+@njit(**LEAF)
 def cover(corners: Array, resolution: float, margin: float, reach: int, mask: Byte) -> None:
     """Mark the cells that a convex outline touches, give or take a margin.
 

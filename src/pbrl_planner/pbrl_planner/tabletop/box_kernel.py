@@ -11,10 +11,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
+
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def separation(
     ax: float, ay: float, at: float, al: float, aw: float, bx: float, by: float, bt: float, bl: float, bw: float
 ) -> float:
@@ -45,7 +47,7 @@ def separation(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def room_inside(x: float, y: float, t: float, length: float, width: float, low: Array, high: Array) -> float:
     """Return how far a box, half of its sides, is from the nearest border; below zero: how far beyond it [m]."""
     c, s = abs(math.cos(t)), abs(math.sin(t))
@@ -53,7 +55,7 @@ def room_inside(x: float, y: float, t: float, length: float, width: float, low: 
     return min(x - ex - low[0], high[0] - x - ex, y - ey - low[1], high[1] - y - ey)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def box_fault(
     layout: Array, item: int, pose: Array, halves: Array, fixed: Array, low: Array, high: Array, margin: float
 ) -> int:
@@ -84,7 +86,7 @@ def box_fault(
     return 0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def ball_meets(
     px: float, py: float, qx: float, qy: float, radius: float, x: float, y: float, t: float, length: float, width: float
 ) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbrl_bag.kernel_options import LEAF
 from pbrl_planner.tabletop.box_kernel import ball_meets, room_inside, separation
 
 Array = NDArray[np.float64]
@@ -72,13 +73,13 @@ class Tree(NamedTuple):
     depth: Index
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def wrapped(angle: float) -> float:
     """Return an angle in [-pi, pi) [rad]."""
     return angle - TWO_PI * math.floor(angle / TWO_PI + 0.5)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def after(pose: Array, mean: Array, share: float, out: Array) -> None:
     """Write where an item is after a share of its displacement."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -87,7 +88,7 @@ def after(pose: Array, mean: Array, share: float, out: Array) -> None:
     out[2] = wrapped(pose[2] + share * mean[2])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def push_fault(layout: Array, item: int, push: int, tables: PushTables, out: Array) -> int:
     """Push an item: write its pose afterwards, and return what is in the way.
 
@@ -134,14 +135,14 @@ def push_fault(layout: Array, item: int, push: int, tables: PushTables, out: Arr
     return 0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def apart(a: Array, b: Array, weight: float) -> float:
     """Return the square of the distance (11) of two poses: an angle counts `weight` metres a radian."""
     dx, dy, turn = a[0] - b[0], a[1] - b[1], weight * wrapped(a[2] - b[2])
     return dx * dx + dy * dy + turn * turn
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**LEAF)
 def nearest(tree: Tree, count: int, goal: Array, weight: float, skip_stuck: bool) -> tuple[int, float]:
     """Return the row of the layout nearest to another, and its squared distance; -1 where all are stuck."""
     best, least = -1, math.inf
