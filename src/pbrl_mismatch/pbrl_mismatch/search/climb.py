@@ -21,6 +21,8 @@ FRESH = 2
 """Slopes in the nuisances are taken anew every so many steps."""
 SETTLED = 0.02
 """A gain below this [nat] of all starts ends the climb."""
+PATIENCE = 2
+"""A start that gains less than that in so many steps one after the other is left where it is."""
 
 
 @dataclass(frozen=True)
@@ -114,44 +116,51 @@ def climb(
     z = objective.at_rest(len(u)) if nuisance is None else nuisance.copy()
     damping = np.full(len(u), FIRST_DAMPING)
     prior_precision = objective.hypothesis.spread**-2.0
-    gained = np.full(len(u), math.inf)
+    gained, idle = np.full(len(u), math.inf), np.zeros(len(u), dtype=np.int64)
     most = 3.0 * objective.hypothesis.spread
     stale = 0 if spread is None else 1
+    slopes = None if spread is None else spread.copy()
     for iteration in range(iterations):
+        on = np.flatnonzero(idle < PATIENCE)
+        if len(on) == 0:
+            break
         # How the start and a steady wrench move the poses hardly depends on what acts besides.
-        linear = objective.linearise(u, z, None if (iteration + stale) % FRESH == 0 else spread)
-        spread = linear.spread
-        z, residual, _ = settled(objective, u, z, spread, linear.residual)
+        fresh = (iteration + stale) % FRESH == 0
+        linear = objective.linearise(u[on], z[on], None if fresh or slopes is None else slopes[on])
+        slopes = _kept(slopes, on, linear.spread)
+        z[on], residual, _ = settled(objective, u[on], z[on], linear.spread, linear.residual)
         linear = replace(linear, residual=residual)
-        reduced = reduce(linear, z)
-        misfit = objective.misfit(linear.residual, z)
-        cost = _cost(objective, u, misfit)
-        gained[:] = 0.0
-        open_rows = np.arange(len(u))
+        reduced = reduce(linear, z[on])
+        misfit = objective.misfit(linear.residual, z[on])
+        cost = _cost(objective, u[on], misfit)
+        gained[on] = 0.0
+        open_rows = np.arange(len(on))
         matrix, vector = reduced.weighed(objective.weights(misfit))
         curvature = matrix + np.diag(prior_precision)
-        pull = vector - (u - objective.hypothesis.mean) * prior_precision
+        pull = vector - (u[on] - objective.hypothesis.mean) * prior_precision
         for _ in range(TRIALS):
-            damped = curvature[open_rows] + damping[open_rows, None, None] * _diagonal(curvature[open_rows])
+            now = on[open_rows]
+            damped = curvature[open_rows] + damping[now, None, None] * _diagonal(curvature[open_rows])
             step = np.linalg.solve(damped, pull[open_rows, :, None])[..., 0]
             step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
-            step = objective.hypothesis.believable(u[open_rows] + step) - u[open_rows]
+            step = objective.hypothesis.believable(u[now] + step) - u[now]
             shift = reduced.shift[open_rows] - (reduced.gain[open_rows] @ step[:, None, :, None])[..., 0]
-            trial_u, trial_z = u[open_rows] + step, z[open_rows] + shift
-            trial_z, _, misfit = settled(objective, trial_u, trial_z, spread[open_rows])
+            trial_u, trial_z = u[now] + step, z[now] + shift
+            trial_z, _, misfit = settled(objective, trial_u, trial_z, slopes[now])
             trial = _cost(objective, trial_u, misfit)
             better = trial < cost[open_rows]
-            rows = open_rows[better]
+            rows = now[better]
             u[rows], z[rows] = trial_u[better], trial_z[better]
-            gained[rows] = 0.5 * (cost[rows] - trial[better])
+            gained[rows] = 0.5 * (cost[open_rows[better]] - trial[better])
             damping[rows] = np.maximum(damping[rows] * EASIER, LEAST_DAMPING)
             open_rows = open_rows[~better]
-            damping[open_rows] = np.minimum(damping[open_rows] * HARDER, MOST_DAMPING)
+            damping[on[open_rows]] = np.minimum(damping[on[open_rows]] * HARDER, MOST_DAMPING)
             if len(open_rows) == 0:
                 break
+        idle[on] = np.where(gained[on] < SETTLED, idle[on] + 1, 0)
         if np.all(gained < SETTLED):
             break
-    linear = objective.linearise(u, z, spread if rough else None)
+    linear = objective.linearise(u, z, slopes if rough else None)
     reduced = reduce(linear, z)
     misfit = objective.misfit(linear.residual, z)
     evidence = log_evidence(objective, u, misfit, reduced)
@@ -182,6 +191,14 @@ def settled(
         if gained < SETTLED:
             break
     return z, residual, here
+
+
+def _kept(known: Array | None, rows: NDArray[np.int64], found: Array) -> Array:
+    """Return what is known of all starts with some rows as they were found; at first all are."""
+    if known is None:
+        return found
+    known[rows] = found
+    return known
 
 
 def _diagonal(matrices: Array) -> Array:
