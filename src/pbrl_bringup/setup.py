@@ -19,7 +19,7 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "pbrl = pbrl_bringup.cli:main",
+            "pbrl = pbrl_bringup.cli.app:main",
         ],
     },
 )

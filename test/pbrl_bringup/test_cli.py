@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from pbrl_bringup.cli import app, run_arguments
+from pbrl_bringup.cli.app import app, run_arguments
 
 MakeBag = Callable[..., Path]
 NAMED = [
@@ -157,7 +157,7 @@ def test_a_fault_of_ours_is_one_line_too(capsys: pytest.CaptureFixture[str], mon
     def broken(name: str) -> None:
         raise TypeError("two\nlines")
 
-    monkeypatch.setattr("pbrl_bringup.cli_handing.import_module", broken)
+    monkeypatch.setattr("pbrl_bringup.cli.handing.import_module", broken)
     monkeypatch.delenv("PBRL_TRACEBACK", raising=False)
     assert run_arguments(["info", "bag"]) == 1
     error = capsys.readouterr().err

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pbrl_bag import write_recording
-from pbrl_bringup.cli import run_arguments
+from pbrl_bringup.cli.app import run_arguments
 from pbrl_bringup.concealed.cases import Case, make
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pbrl_bringup.benches.cabinet import data_file
-from pbrl_bringup.cli import run_arguments
+from pbrl_bringup.cli.app import run_arguments
 from pbrl_bringup.paths import config_file
 
 

@@ -13,7 +13,7 @@ import pybullet
 import pytest
 from jsonschema import Draft202012Validator
 
-from pbrl_bringup.cli import run_arguments
+from pbrl_bringup.cli.app import run_arguments
 from pbrl_bringup.export.mesh import mesh_text
 from pbrl_bringup.export.rigid import RigidBody, rigid_body
 from pbrl_model.arviz_bridge import load_posterior

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pbrl_bringup.cli import run_arguments
+from pbrl_bringup.cli.app import run_arguments
 from pbrl_bringup.paths import workspace
 
 MakeBag = Callable[..., Path]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pbrl_bringup.cli import run_arguments
+from pbrl_bringup.cli.app import run_arguments
 from pbrl_bringup.fuzz.push_seed import encoded, plain_mcap, push
 from pbrl_bringup.terminal import output, say, table
 

@@ -1,5 +1,5 @@
 """`python -m pbrl_bringup`: what `./pbrl` hands over to."""
 
-from pbrl_bringup.cli import main
+from pbrl_bringup.cli.app import main
 
 main()

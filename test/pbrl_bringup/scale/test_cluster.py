@@ -12,7 +12,7 @@ import pytest
 from distributed import LocalCluster
 from scale_kit import square
 
-from pbrl_bringup.cli import run_arguments
+from pbrl_bringup.cli.app import run_arguments
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.scale import cluster as clusters
 from pbrl_bringup.scale import pieces

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import pytest
 from scale_kit import square
 
-from pbrl_bringup.cli import run_arguments
+from pbrl_bringup.cli.app import run_arguments
 from pbrl_bringup.scale.cluster import cluster
 from pbrl_bringup.scale.pieces import run_pieces
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from pbrl_bringup.cli import run_arguments
+from pbrl_bringup.cli.app import run_arguments
 
 FEW = ("--draws", "20", "--model-class", "free")
 

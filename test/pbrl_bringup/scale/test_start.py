@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-MODULES = "pbrl_bringup.cli, pbrl_bringup.commands.bench, pbrl_bringup.commands.fit, pbrl_bringup.commands.diagnose"
+MODULES = "pbrl_bringup.cli.app, pbrl_bringup.commands.bench, pbrl_bringup.commands.fit, pbrl_bringup.commands.diagnose"
 
 
 def test_commands_load_without_dask() -> None:

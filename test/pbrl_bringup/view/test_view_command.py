@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from pbrl_bag import write_recording
-from pbrl_bringup.cli import run_arguments
+from pbrl_bringup.cli.app import run_arguments
 
 sys.path.insert(0, str(Path(__file__).parent))
 from view_kit import recorded

@@ -20,7 +20,7 @@ from pbrl_bag import cut_episodes, describe, read_recording
 from pbrl_bag.mapping import load_mapping
 from pbrl_bag.playback import load_bag
 from pbrl_bag.proposing import mapping_text, propose
-from pbrl_bringup.cli_errors import errors_of_ours
+from pbrl_bringup.cli.errors import errors_of_ours
 from pbrl_bringup.commands.export import command as export
 from pbrl_bringup.experiments.household import load_household
 from pbrl_bringup.files import write_text

@@ -23,7 +23,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pbrl_bringup.cli_errors import is_for_the_user
+from pbrl_bringup.cli.errors import is_for_the_user
 
 PATIENCE = 5.0
 """Processor time that one input may take [s]."""

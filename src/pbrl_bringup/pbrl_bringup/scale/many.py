@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pbrl_bringup.cli_errors import told_of
+from pbrl_bringup.cli.errors import told_of
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.files import output_folder, result_folder, write_json, write_text
 from pbrl_bringup.scale.cluster import cluster

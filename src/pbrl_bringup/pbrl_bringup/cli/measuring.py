@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from pbrl_bringup.cli_handing import hand_over
-from pbrl_bringup.cli_options import Quick, Scheduler, Seed
+from pbrl_bringup.cli.handing import hand_over
+from pbrl_bringup.cli.options import Quick, Scheduler, Seed
 
 
 def bench(

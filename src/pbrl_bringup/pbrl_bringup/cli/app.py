@@ -15,11 +15,11 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from pbrl_bringup.cli_errors import complain, complain_of
-from pbrl_bringup.cli_handing import hand_over
-from pbrl_bringup.cli_learning import diagnose, fit
-from pbrl_bringup.cli_measuring import bench, cluster, experiment
-from pbrl_bringup.cli_options import (
+from pbrl_bringup.cli.errors import complain, complain_of
+from pbrl_bringup.cli.handing import hand_over
+from pbrl_bringup.cli.learning import diagnose, fit
+from pbrl_bringup.cli.measuring import bench, cluster, experiment
+from pbrl_bringup.cli.options import (
     Bag,
     Diagnosis,
     Domain,
