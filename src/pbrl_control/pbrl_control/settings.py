@@ -40,6 +40,7 @@ class BaseSettings(Section):
     """Limits of the differential base, and how it keeps what the arms carry in the middle of their workspace."""
 
     speed: Positive = 0.35  # [m/s]
+    forward_speed: Positive = 0.17  # [m/s] forwards: from more it would tip, were it to be at rest within 0.3 s
     yaw_rate: Positive = 0.5  # [rad/s]
     acceleration: Positive = 0.5  # [m/s^2]
     yaw_acceleration: Positive = 1.0  # [rad/s^2]
@@ -134,14 +135,15 @@ class ComplianceSettings(Section):
 class WatchSettings(Section):
     """When a stream that control needs cannot be trusted any more."""
 
-    lost: Positive = 1.0  # [s] without a sample
+    lost: Positive = 1.0  # [s] without a tag of what is held: it may be hidden for a moment
+    link: Positive = 0.14  # [s] without any tag at all, joint positions or a wrench: nobody sends any more
     frozen: Positive = 1.0  # [s] of motion with the same sample again and again
 
 
 class ControllerSettings(Section):
     """Everything the body controller can be told."""
 
-    timeout: Positive = 0.2  # [s] a command older than this is no command
+    timeout: Positive = 0.07  # [s] a command older than this is no command
     method: Literal["program", "pseudo-inverse"] = "program"
     program: ProgramSettings = ProgramSettings()
     pseudo_inverse: PseudoInverseSettings = PseudoInverseSettings()

@@ -11,6 +11,7 @@ done by it.
 from __future__ import annotations
 
 import gc
+import math
 import threading
 import time
 from dataclasses import replace
@@ -58,6 +59,8 @@ from pbrl_control.watchdog import Watchdog
 from pbrl_control.whole_body.prepare import compile_kernels
 
 JOINTS = "joint positions"
+TAGS = "tags"
+SIGN_OF_LIFE = 0.2  # [s of the wall clock] between two while nothing is commanded
 STIRS = 0.02  # [rad/s] of a joint, at which its position has to change
 
 
@@ -89,6 +92,7 @@ class BodyControllerNode(Node):
         self._last: float | None = None
         self._moving = False
         self._in_motion = self._arms_in_motion = False
+        self._told = -math.inf
         self._report = ""
         self._diagnostics = Diagnostics(self, self._doing, lambda: self._report, self._numbers)
         self._create_publishers()
@@ -162,6 +166,7 @@ class BodyControllerNode(Node):
 
     def _on_tag(self, name: str, message: PoseStamped) -> None:
         tag = self._tags[name] = tag_from_msg(message)
+        self._watch.feed(TAGS, self._now(), np.array([tag.time]), moving=False)
         self._watch.feed(_tag_stream(name), self._now(), np.array([tag.time]), moving=self._in_motion)
 
     def _on_joints(self, message: JointState) -> None:
@@ -207,14 +212,15 @@ class BodyControllerNode(Node):
         """Return which stream that is needed cannot be trusted, and why; empty where all can."""
         now = self._now()
         self._watch.feed(JOINTS, now, posture.vector(), moving=self._arms_in_motion)
-        needed = [JOINTS]
+        needed, links = [JOINTS], [TAGS, *(_wrench_stream(side) for side in self._grips)]
         for side, grip in self._grips.items():
             needed += [_wrench_stream(side), _tag_stream(grip.object), _tag_stream(gripper_tag(side))]
-        return self._watch.complaint(now, needed)
+        return self._watch.cut(now, links) or self._watch.complaint(now, needed)
 
     def _send(self, command: BodyCommand | None, controller: BodyController) -> None:
         """Publish a command; when commands cease, one that stops everything, and then leave the drives alone."""
         if command is None and not self._moving:
+            self._give_a_sign_of_life(controller)
             return
         self._moving = command is not None
         command = command or BodyCommand()
@@ -229,6 +235,13 @@ class BodyControllerNode(Node):
             self._status.publish(String(data=command.report or "ok"))
             if command.report:
                 self.get_logger().warning(command.report)
+
+    def _give_a_sign_of_life(self, controller: BodyController) -> None:
+        """Tell the share now and then though nothing is commanded: who commands may wait for this before he does."""
+        now = time.monotonic()
+        if now - self._told >= SIGN_OF_LIFE:
+            self._told = now
+            self._share.publish(Float64(data=controller.share))
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9
