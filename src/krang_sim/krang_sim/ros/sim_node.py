@@ -38,7 +38,7 @@ class SimNode(PacedSimulator):
         self.session = KrangSession(scene, seed=seed, gui=gui)
         self.start(self.session, message_types(self.session.tagged, self.session.cameras))
         self.obey_arms(self.session)
-        self.listen(Twist, "cmd_vel", lambda message: self.session.command_base(message.linear.x, message.angular.z))
+        self.listen(Twist, "cmd_vel", self._command_base)
         self.listen(Float64MultiArray, "body_velocity_controller/commands", self._command_body)
 
     def _declare(self) -> tuple[Scene, int, bool]:
@@ -53,6 +53,11 @@ class SimNode(PacedSimulator):
         refuse_unknown(self)
         loaded = with_model(load_scene(scene), Path(model)) if model else load_scene(scene)
         return with_tags(loaded, tags) if tags else loaded, seed, gui
+
+    def _command_base(self, message: Twist) -> None:
+        self.session.command_base(message.linear.x, message.angular.z)
+        if self.session.halted:
+            self.get_logger().warning(self.session.halted, throttle_duration_sec=1.0)
 
     def _command_body(self, message: Float64MultiArray) -> None:
         if len(message.data) != 2:

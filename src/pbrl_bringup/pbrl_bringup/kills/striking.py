@@ -208,14 +208,18 @@ def lost_of(life: Life, frozen: Sequence[tuple[float, float]]) -> float:
         life: the graph, ended.
         frozen: from when to when a recorder or simulator was frozen or away [s of the wall clock].
     """
-    truth = np.concatenate([read_truth(path)[:, WALL] for path, _ in life.truths])
+    walls = [read_truth(path)[:, WALL] for path, _ in life.truths]
     worst = 0.0
     for bag, begun, ended in life.bags:
         try:
             heard = _times(bag)
         except BagError:
             return NEVER
-        worst = max(worst, _missing(truth[(truth > begun) & (truth < ended)], heard, frozen))
+        for truth in walls:
+            # A simulator that was started anew has to be found first: from then on it counts.
+            met = heard[np.searchsorted(heard, truth[0]) :] if len(truth) else heard[:0]
+            begin = max(begun, met[0]) if len(met) else begun
+            worst = max(worst, _missing(truth[(truth > begin) & (truth < ended)], heard, frozen))
     return worst
 
 

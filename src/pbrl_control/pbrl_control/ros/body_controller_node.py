@@ -33,15 +33,17 @@ from pbrl_bag.ros.running import run_node
 from pbrl_bag.ros.stopping import spin_in_order
 from pbrl_control.controller import BodyController
 from pbrl_control.errors import ControlError
+from pbrl_control.fence import Fence
 from pbrl_control.installed import params_folder
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
 from pbrl_control.limits import LONGEST
-from pbrl_control.percept import Grip, Percept, Tag, gripper_tag, holds_of
+from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag, holds_of
 from pbrl_control.planar import Array
 from pbrl_control.realtime import take_priority
 from pbrl_control.ros.conversions import (
     arm_to_msg,
     base_to_msg,
+    bodies_from_msg,
     expected_from_msg,
     grips_from_msg,
     movable_from_msg,
@@ -51,6 +53,7 @@ from pbrl_control.ros.conversions import (
     twist_from_msg,
     wrench_from_msg,
 )
+from pbrl_control.ros.floor_conversions import fixed_from_msg
 from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
 from pbrl_control.sensor_watch import SensorWatch
 from pbrl_control.settings import ControllerSettings, load_section
@@ -79,6 +82,9 @@ class BodyControllerNode(Node):
         self._settings = load_section(file, ControllerSettings, "settings")
         compile_kernels(self._settings)  # before anybody can see this node: who sees it may count on its ticks
         self._controller: BodyController | None = None
+        self._fence: Fence | None = None
+        self._bodies: dict[str, BodyShape] = {}
+        self._fixed: dict[str, Array] = {}
         self._watchdog = Watchdog(self._settings.timeout)
         self._watch = SensorWatch(self._settings.watch)
         self._emergency = False
@@ -139,13 +145,18 @@ class BodyControllerNode(Node):
     def _on_description(self, message: String) -> None:
         try:
             self._controller = BodyController(RobotKinematics(message.data), self._settings)
+            self._fence = Fence(message.data, self._settings.fence)
+            self._fence.told(self._bodies, self._fixed)
         except ControlError as error:
             self._controller = None
             self.get_logger().error(str(error))
 
     def _on_scene(self, message: Scene) -> None:
+        self._bodies, self._fixed = bodies_from_msg(message), fixed_from_msg(message)
         for name in movable_from_msg(message):
             self._listen_to_tag(name)
+        if self._fence is not None:
+            self._fence.told(self._bodies, self._fixed)
 
     def _on_grasps(self, message: Grasps) -> None:
         self._grips = grips_from_msg(message)
@@ -194,8 +205,11 @@ class BodyControllerNode(Node):
             lost = self._lost_stream(posture) if twists else ""
             if lost:
                 return controller.stand(lost)
-            holds = self._with_expected(holds_of(Percept(posture, self._tags, self._wrenches, self._grips)))
+            percept = Percept(posture, self._tags, self._wrenches, self._grips, self._bodies)
+            holds = self._with_expected(holds_of(percept))
             command = controller.tick(BodyState(posture), twists, holds, self._wrenches, dt)
+            if self._fence is not None and (fault := self._fence.fault(self._now(), percept, command)):
+                return controller.stand(fault)
         except ControlError as error:
             return controller.stand(str(error))
         return command if twists or command.report else None
