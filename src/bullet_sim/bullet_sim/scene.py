@@ -20,6 +20,7 @@ from bullet_sim.catalogue import Body
 from bullet_sim.concealed.checks import check_concealed
 from bullet_sim.concealed.options import Concealed
 from bullet_sim.errors import SimError, nearest
+from bullet_sim.faults import Faults
 from bullet_sim.model_file import concealed_of
 from bullet_sim.placing import placed_footprint
 from bullet_sim.settings import (
@@ -155,6 +156,7 @@ class Scene(Settings):
     Attributes:
         keep_out: corners of each place that nothing of robot or load may enter [m], `world`; no thing, and in nobody's
             way in Bullet.
+        faults: what goes wrong with messages and clocks on purpose, see `bullet_sim.faults`.
         models: file of a learned model by the body that is to behave so; read by `load_scene` into `concealed`. A path
             that is not absolute is taken from the scene's file.
     """
@@ -167,6 +169,7 @@ class Scene(Settings):
     sensors: Sensors = Sensors()
     concealed: Concealed = Concealed()
     keep_out: tuple[Outline, ...] = ()
+    faults: Faults = Faults()
     models: dict[str, str] = Field(default_factory=dict)
 
     @model_validator(mode="after")

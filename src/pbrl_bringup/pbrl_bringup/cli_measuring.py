@@ -17,7 +17,7 @@ def bench(
         typer.Argument(
             help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose, calibration, concealed, tags, control, "
             "cart, namo, lattice, next-experiment, foreign, played-again, two-robots, view, mismatch, scale, fuzz, "
-            "kills, fence."
+            "kills, fence, soak."
         ),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,

@@ -32,6 +32,7 @@ BENCHES = {
     "fuzz": "hostile files and messages by the thousand: each is read, or refused in one line",
     "kills": "nodes of the NAMO graph killed and frozen at every state: rest, mission, recording",
     "fence": "random and hostile missions beside places that are kept out of: how near robot and load come to them",
+    "soak": "an hour of NAMO in random rooms: memory, handles, threads, deadlines, the recording",
     "mismatch": "the watch over a stream: half an hour of clean pushing without an alarm, and how late alarms are",
     "scale": "many recordings on a Dask cluster: two workers against one, a worker killed, a thousand queued",
 }
@@ -40,7 +41,7 @@ WITH_SETS = ("concealed", "fuzz")
 """Benches whose cases come in sets."""
 WITH_MOST = (*WITH_SETS, "kills", "fence")
 """Benches whose cases can be counted."""
-WITH_MINUTES = WITH_MOST
+WITH_MINUTES = (*WITH_MOST, "soak")
 """Benches that can end after a time."""
 
 
