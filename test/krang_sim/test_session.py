@@ -91,10 +91,36 @@ def test_rates_and_motion_do_not_depend_on_the_step(make_scene, step):
 def test_base_stops_when_nobody_repeats_the_command(make_scene, make_session):
     session = make_session(make_scene(bodies={}))
     run(session, 1.0, lambda: session.command_base(0.1, 0.0))
-    assert last(run(session, 0.15), Odometry).twist[0] == pytest.approx(0.1, rel=0.05)
+    assert last(run(session, 0.08), Odometry).twist[0] == pytest.approx(0.1, rel=0.05)
     run(session, 0.5)
     assert abs(last(run(session, 0.1), Odometry).twist[0]) < 1e-3
     assert session.robot.base_pose().position[0] == pytest.approx(0.12, abs=0.02)
+
+
+@pytest.mark.parametrize("base", [(9.0, 0.0), (-9.0, 0.0), (0.0, -9.0), (9.0, 9.0), (-9.0, 9.0)])
+@pytest.mark.parametrize("says", ["nothing", "zeros"])
+def test_the_robot_is_at_rest_within_the_third_part_of_a_second_whatever_was_asked_of_it(
+    make_scene, make_session, base, says
+):
+    session = make_session(make_scene(bodies={}))
+
+    def drive():
+        session.command_base(*base)
+        session.command_arm("left", [0.3, 0.0, 0.0, 0.3, 0.0, 0.0, -0.3])
+
+    run(session, 1.5, drive)
+    speed, turning = session.robot.base_twist()
+    assert speed < 0.36 and turning < 0.53, "no more than it may"
+    assert speed > 0.16 or turning > 0.45
+    if says == "zeros":
+        session.command_base(0.0, 0.0)
+        session.command_arm("left", [0.0] * 7)
+    run(session, 0.29 if says == "nothing" else 0.2)
+    speeds = []
+    while len(speeds) < 40:
+        session.step()
+        speeds.append((*session.robot.base_twist(), np.abs(session.robot.joint_state()[1][2:]).max()))
+    assert (np.max(speeds, axis=0) < (0.01, 0.02, 0.03)).all()
 
 
 def test_arms_and_body_stop_too(make_scene, make_session):
@@ -102,7 +128,7 @@ def test_arms_and_body_stop_too(make_scene, make_session):
     session.command_arm("left", [0.1] * 7)
     session.command_arm("right", [-0.1] * 7)
     session.command_body(-0.1, 0.1)
-    moving = last(run(session, 0.19), JointStates)
+    moving = last(run(session, 0.09), JointStates)
     np.testing.assert_allclose(np.abs(moving.velocity[2:]), 0.1, rtol=0.05)
     still = last(run(session, 0.5), JointStates)
     np.testing.assert_allclose(still.velocity[2:], 0.0, atol=2e-3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import subprocess
 import time
@@ -10,16 +11,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from std_msgs.msg import String
+from std_msgs.msg import String, UInt8MultiArray
 
 from pbrl_bag import describe, read_recording
 from pbrl_bag.mcap_file import McapFile
+from pbrl_bag.metadata import read_metadata
 from pbrl_bag.ros.conversions import message_class
 from pbrl_bag.ros.crash_harness import crash_recorder, executable
 
@@ -71,6 +74,35 @@ def graph() -> Iterator[Graph]:
     made = Graph()
     yield made
     made.close()
+
+
+MOST = 3_000_000  # [bytes] of a file that the recorder may write; its middleware wants some, too
+
+
+def test_a_recorder_whose_disk_is_full_says_so_in_a_line_and_keeps_what_it_has(graph: Graph, tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, 100_000, dtype=np.uint8)  # does not pack
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (MOST, before[1]))  # a child has it from us
+    try:
+        recorder = graph.start("recorder_node", output=str(tmp_path / "bag"), topics="[/noise]")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    publisher = graph.node.create_publisher(UInt8MultiArray, "/noise", 10)
+    graph.until(lambda: publisher.get_subscription_count() > 0)
+
+    def ended() -> bool:
+        publisher.publish(UInt8MultiArray(data=noise))
+        return recorder.poll() is not None
+
+    graph.until(ended)
+    said = [line for line in recorder.stderr.read().splitlines() if "cannot write" in line]
+    assert recorder.returncode == 2
+    assert len(said) == 1 and said[0].startswith("recorder_node: ") and "messages before it are kept" in said[0]
+    file = McapFile(tmp_path / "bag" / "bag_0.mcap")
+    messages = list(file.messages())
+    assert f"the {len(messages)} messages" in said[0]
+    assert len(messages) >= 5 and all(bytes(noise) in message.data for message in messages)
+    assert read_metadata(tmp_path / "bag")["message_count"] <= len(messages)
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import filecmp
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import yaml
 from mcap.reader import make_reader
@@ -164,3 +168,35 @@ def test_qos_given_for_a_topic_is_kept(tmp_path: Path) -> None:
         writer.write("/say", STRING, String(data="x"), 1)
     (topic,) = describe(tmp_path / "bag").topics
     assert list(topic.qos) == offered
+
+
+@contextmanager
+def little_room(most: int) -> Iterator[None]:
+    """Let no file of this process grow beyond so many bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("flushed", [True, False])
+def test_a_bag_on_a_full_disk_keeps_what_it_has_and_says_the_same_ever_after(tmp_path: Path, flushed: bool) -> None:
+    noise = np.random.default_rng(0)
+    bag = BagWriter(tmp_path / "bag", live=False)
+    with little_room(200_000), pytest.raises(BagError, match="cannot write: File too large; the") as caught:
+        for k in range(1000):
+            bag.write("/noise", "std_msgs/msg/String", SimpleNamespace(data=noise.bytes(2000).hex()), k)
+            if flushed:
+                bag.flush()
+    messages = list(McapFile(bag.path).messages())
+    assert f"the {len(messages)} messages" in str(caught.value)
+    assert [message.log_time for message in messages] == list(range(len(messages)))
+    assert len(messages) >= 50 if flushed else not messages
+    # There is room again: nothing is written behind what is missing.
+    for what in (lambda: bag.write("/noise", "std_msgs/msg/String", SimpleNamespace(data="x"), 0), bag.close):
+        with pytest.raises(BagError, match="File too large"):
+            what()
+    assert list(McapFile(bag.path).messages()) == messages
+    assert not list(bag.folder.glob(".*")), "no half of a metadata.yaml is left"

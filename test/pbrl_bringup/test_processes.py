@@ -112,3 +112,18 @@ def test_a_name_is_used_once(tmp_path: Path) -> None:
 def test_a_program_that_is_not_there_is_an_error_of_one_line(tmp_path: Path) -> None:
     with Programs(tmp_path) as programs, pytest.raises(BringupError, match=r"sim: .*cannot be started"):
         programs.start("sim", [str(tmp_path / "nothing")])
+
+
+def test_who_is_not_missed_is_let_go_once_and_the_others_go_on(tmp_path: Path) -> None:
+    with Programs(tmp_path) as programs:
+        programs.start("spare", python("print('enough'); raise SystemExit(2)"))
+        programs.start("needed", python(PATIENT))
+        assert programs.ended("spare", 60.0)
+        assert programs.let_go({"needed"}) == []
+        with pytest.raises(BringupError, match="spare ended with exit code 2: enough"):
+            programs.check()
+        (gone,) = programs.let_go({"spare", "needed"})
+        assert (gone.name, gone.last_line()) == ("spare", "enough")
+        assert programs.let_go({"spare"}) == []
+        programs.check()
+        assert programs.names == ("needed",)

@@ -52,3 +52,22 @@ def test_only_what_is_needed_is_asked_for() -> None:
 
 def test_a_sample_that_is_no_number_is_no_change() -> None:
     assert fed(np.full((100, 6), np.nan), True) == "", "NaN is told by the controller itself"
+
+
+def cut(period: float, silence: float) -> str:
+    """Return what is said of a link whose samples came in a period [s], after some silence [s]."""
+    watch = SensorWatch(WatchSettings(link=0.14))
+    for k in range(20):
+        watch.feed("tags", period * k, np.array([float(k)]), moving=False)
+    return watch.cut(19 * period + silence, ["tags"])
+
+
+def test_a_link_that_is_silent_is_cut_soon_and_a_slow_one_after_two_of_its_periods() -> None:
+    assert cut(1 / 15, 0.13) == ""
+    assert "tags: expected samples, none for 0.16 s" in cut(1 / 15, 0.16)
+    assert cut(0.5, 1.0) == ""
+    assert "none for 1.20 s" in cut(0.5, 1.2)
+
+
+def test_a_link_that_never_was_cannot_be_cut() -> None:
+    assert SensorWatch(WatchSettings()).cut(100.0, ["tags"]) == ""

@@ -20,6 +20,7 @@ from bullet_sim.catalogue import Body
 from bullet_sim.concealed.checks import check_concealed
 from bullet_sim.concealed.options import Concealed
 from bullet_sim.errors import SimError, nearest
+from bullet_sim.faults import Faults
 from bullet_sim.model_file import concealed_of
 from bullet_sim.placing import placed_footprint
 from bullet_sim.settings import (
@@ -153,6 +154,9 @@ class Scene(Settings):
     """One scene, known and concealed parts together.
 
     Attributes:
+        keep_out: corners of each place that nothing of robot or load may enter [m], `world`; no thing, and in nobody's
+            way in Bullet.
+        faults: what goes wrong with messages and clocks on purpose, see `bullet_sim.faults`.
         models: file of a learned model by the body that is to behave so; read by `load_scene` into `concealed`. A path
             that is not absolute is taken from the scene's file.
     """
@@ -164,6 +168,8 @@ class Scene(Settings):
     goal: Goal | None = None
     sensors: Sensors = Sensors()
     concealed: Concealed = Concealed()
+    keep_out: tuple[Outline, ...] = ()
+    faults: Faults = Faults()
     models: dict[str, str] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -184,6 +190,11 @@ class Scene(Settings):
         floor = Polygon(self.room.outline).buffer(1e-6)
         if not floor.contains(Point(self.robot.pose[:2])):
             raise ValueError(f"robot.pose: expected a start in the room, got {list(self.robot.pose)}")
+        for number, corners in enumerate(self.keep_out):
+            if f"keep_out_{number}" in self.bodies:
+                raise ValueError(f"bodies.keep_out_{number}: expected another name: keep_out.{number} is told by it")
+            if Polygon(corners).distance(Point(self.robot.pose[:2])) <= 0.0:
+                raise ValueError(f"keep_out.{number}: expected a place where the robot does not start")
         placed: dict[str, Polygon] = {}
         for name, body in self.bodies.items():
             shape = placed_footprint(body)

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from bullet_sim import commands
 from krang_sim.errors import KrangError
 
-TIMEOUT = 0.2
-"""Age [s] at which a command no longer counts."""
+TIMEOUT = 0.1
+"""Age [s] at which a command no longer counts: ten of a controller's that runs at 100 Hz."""
 
 
 class CommandWatchdog(commands.CommandWatchdog):

@@ -39,7 +39,15 @@ ENCODER_STEP = 2 * math.pi / (4000 * 15)
 """Angle [rad] of a wheel per count: 4000 counts on the motor side of 15:1 gears."""
 
 BASE_ACCELERATION = (0.5, 1.0)
-"""Most change of speed [m/s^2] and turning [rad/s^2]; an estimate. Braking at 1.0 m/s^2 would tip the robot."""
+"""Most change of speed [m/s^2] and turning [rad/s^2]; an estimate."""
+BRAKING = (1.0, 2.2, 3.0)
+"""The same where a stop is commanded or commands have ceased: forwards, backwards, turning. In Bullet the slider lifts
+off the floor from 1.1 m/s^2 on when it drives forwards: it then rocks for longer than it would have rolled on."""
+BASE_SPEED = (0.35, 0.17, 0.5)
+"""Most that the base obeys: backwards, forwards [m/s], turning [rad/s]. From each it is at rest 0.3 s after the last
+command: the watchdog's 0.1 s, then `BRAKING`."""
+JOINT_BRAKING = 2.0
+"""By so much arms slow down faster than they speed up, where a stop is commanded or commands have ceased."""
 JOINT_ACCELERATION = np.radians([100.0, 100.0] + 2 * [100.0, 100.0, 95.0, 95.0, 100.0, 100.0, 200.0])
 """(16,) [rad/s^2] of `BODY_JOINTS`, from the drives' data sheets."""
 
@@ -133,8 +141,9 @@ class Krang:
             self._client.api.enableJointForceTorqueSensor(self.number, self.links[f"{side}_ft"], True)
 
     def command_base(self, v: float, w: float) -> None:
-        """Ask for a speed forward [m/s] and a rate of turning left [rad/s]."""
-        self._base_command[:] = v, w
+        """Ask for a speed forward [m/s] and a rate of turning left [rad/s], within `BASE_SPEED`; zeros: stop."""
+        backwards, forwards, turning = BASE_SPEED
+        self._base_command[:] = min(max(v, -backwards), forwards), min(max(w, -turning), turning)
 
     def command_joints(self, first: str, velocity: Sequence[float] | Array) -> None:
         """Ask for velocities [rad/s] of consecutive joints, `first` being the name of the first of them."""
@@ -161,17 +170,24 @@ class Krang:
         )
 
     def _ramp(self, step: float) -> None:
-        change = np.array(BASE_ACCELERATION) * step
+        change = self._base_change() * step
         self._base_speed += np.clip(self._base_command - self._base_speed, -change, change)
         v, w = self._base_speed
         self._velocity[0] = (v - w * TRACK / 2) / WHEEL_RADIUS
         self._velocity[1] = (v + w * TRACK / 2) / WHEEL_RADIUS
         limit = self.limits.velocity[2:]
         wanted = np.clip(self._joint_command, -limit, limit)
-        change = JOINT_ACCELERATION * step
+        change = JOINT_ACCELERATION * step * np.where(wanted == 0.0, JOINT_BRAKING, 1.0)
         self._velocity[2:] += np.clip(wanted - self._velocity[2:], -change, change)
         at_stop = self._at_stop(wanted)
         self._velocity[2:][at_stop] = 0.0
+
+    def _base_change(self) -> Array:
+        """Return most change of speed and turning (2,): a command of zeros, or none, is a stop."""
+        if self._base_command.any():
+            return np.array(BASE_ACCELERATION)
+        forwards, backwards, turning = BRAKING
+        return np.array([forwards if self._base_speed[0] > 0.0 else backwards, turning])
 
     def _at_stop(self, wanted: Array) -> NDArray[np.bool_]:
         reference = self._reference[2:]
@@ -215,6 +231,11 @@ class Krang:
     def base_pose(self) -> Pose:
         """Read the true pose of `base` in `world`: for scoring and for relative poses, never for a topic."""
         return self._client.centre_pose(NAME)
+
+    def base_twist(self) -> tuple[float, float]:
+        """Read the true speed over the floor [m/s] and rate of turning [rad/s], without signs: for scoring only."""
+        (x, y, _), (_, _, spin) = self._client.api.getBaseVelocity(self.number)
+        return math.hypot(x, y), abs(spin)
 
 
 class WheelOdometry:

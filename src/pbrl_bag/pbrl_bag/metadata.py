@@ -91,11 +91,15 @@ def record_text(document: dict[str, Any]) -> str:
 def write_metadata(folder: Path, document: dict[str, Any]) -> None:
     """Replace metadata.yaml in one step: a reader sees the old one or the new one, whole."""
     part = folder / f".{FILE_NAME}.part"
-    with part.open("w", encoding="utf-8") as file:
-        yaml.dump(document, file, Dumper=_Dumper, sort_keys=False, default_flow_style=False)
-        file.flush()
-        os.fsync(file.fileno())
-    part.replace(folder / FILE_NAME)
+    try:
+        with part.open("w", encoding="utf-8") as file:
+            yaml.dump(document, file, Dumper=_Dumper, sort_keys=False, default_flow_style=False)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(folder / FILE_NAME)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
 
 
 class _Dumper(yaml.SafeDumper):

@@ -2,6 +2,7 @@
 
 A finished chunk is never lost: chunks are finished at least every `FLUSH_SECONDS` of wall time and
 handed to the disk, so a process that is killed loses no more than that and the file reads up to there.
+A disk that fails or is full costs no more either: the file is cut back to its last finished chunk.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import os
 import threading
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -59,6 +61,7 @@ class BagWriter:
         self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._writer.start(profile=Profile.ROS2, library="pbrl_bag")
         self._file.flush()  # a recorder killed at once leaves an empty recording, not an empty file
+        self._good = self._file.tell()
         self._metadata = BagMetadata(self.path.name, ros_distro)
         self._channels: dict[str, tuple[int, str]] = {}
         self._schemas: dict[str, int] = {}
@@ -141,7 +144,7 @@ class BagWriter:
                     sequence,
                 )
             except OSError as error:
-                raise self._disk(error) from error
+                raise self._fail(error) from error
             self._metadata.count(topic, log_time_ns)
             self._dirty = True
 
@@ -156,11 +159,17 @@ class BagWriter:
                 return
             try:
                 self._writer.flush()  # type: ignore[no-untyped-call]
+                self._file.flush()
             except OSError as error:
-                raise self._disk(error) from error
+                raise self._fail(error) from error
             self._dirty = False
+            self._good = self._file.tell()
             self._on_disk = self._metadata.to_dict()
-        os.fsync(self._file.fileno())
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as error:  # what was thought to be written is not
+            with self._lock:
+                raise self._fail(error) from error
 
     def close(self) -> None:
         """Write footer and metadata; does nothing the second time.
@@ -174,18 +183,19 @@ class BagWriter:
             self._closed.set()
         if self._thread:
             self._thread.join()
-        self._on_disk = self._metadata.to_dict()
+        if self._failure:
+            raise self._disk(self._failure)
+        whole = self._metadata.to_dict()
         try:
-            self._writer.add_metadata("rosbag2", {"serialized_metadata": record_text(self._on_disk)})
+            self._writer.add_metadata("rosbag2", {"serialized_metadata": record_text(whole)})
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.flush()
             os.fsync(self._file.fileno())
             self._file.close()
-            self._save()
         except OSError as error:
-            raise self._disk(error) from error
-        if self._failure:
-            raise self._disk(self._failure)
+            raise self._fail(error) from error
+        self._on_disk = whole
+        self._save_if_there_is_room()
 
     def _schema(self, type_name: str) -> int:
         """Return the id of a type's schema, registered on first use."""
@@ -210,11 +220,34 @@ class BagWriter:
 
     def _disk(self, error: OSError) -> BagError:
         """Return the error for a disk that failed."""
-        return BagError(f"{self.path}: cannot write: {error.strerror or error}; make room and record again")
+        kept = self._on_disk["rosbag2_bagfile_information"]["message_count"]
+        return BagError(
+            f"{self.path}: cannot write: {error.strerror or error}; the {kept} messages before it are kept, make room "
+            f"and record again"
+        )
+
+    def _fail(self, error: OSError) -> BagError:
+        """Return the error for a disk that failed, and keep what is on it: whole chunks, and nothing behind them."""
+        if self._failure is None:
+            self._failure = error
+            with suppress(OSError):
+                os.ftruncate(self._file.fileno(), self._good)
+            # What is left in the buffer must not be written behind that, whenever it is let go.
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._file.fileno())
+            os.close(nowhere)
+            self._file.close()
+            self._save_if_there_is_room()
+        return self._disk(self._failure)
 
     def _save(self) -> None:
         """Write metadata.yaml: what finished chunks hold, so that it never promises what a crash takes."""
         write_metadata(self.folder, self._on_disk)
+
+    def _save_if_there_is_room(self) -> None:
+        """Save metadata; where it cannot be, what was saved last stays, and tells of a little less."""
+        with suppress(OSError):
+            self._save()
 
     def _keep_safe(self) -> None:
         """Finish chunks and refresh metadata until closed; runs in a thread of its own."""
@@ -225,6 +258,9 @@ class BagWriter:
                 if time.monotonic() - saved >= METADATA_SECONDS:
                     self._save()
                     saved = time.monotonic()
-            except (OSError, BagError) as error:
-                self._failure = error if isinstance(error, OSError) else OSError(str(error))
+            except OSError as error:
+                with self._lock:
+                    self._fail(error)
+                return
+            except BagError:  # it is kept, and said by whoever writes next
                 return

@@ -133,3 +133,5 @@ class Manipulation:
     @perceive.register
     def _(self, observation: KnownScene) -> None:
         self._bodies = {body.name: BodyShape(body.footprint, body.height) for body in observation.bodies}
+        if self.loop:
+            self.loop.told(self._bodies, {body.name: body.pose for body in observation.bodies if not body.movable})

@@ -11,7 +11,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -96,6 +96,13 @@ class Programs:
             raise BringupError(f"{name}: {command[0]} cannot be started: {error.strerror}") from error
         self._running[name] = Program(name, process, log)
         return self._running[name]
+
+    def let_go(self, names: Container[str]) -> list[Program]:
+        """Return those of some programs that have ended by themselves, and forget them: they are not missed."""
+        ended = [each for each in self._running.values() if each.name in names and each.process.poll() is not None]
+        for program in ended:
+            del self._running[program.name]
+        return ended
 
     def check(self) -> None:
         """Raise BringupError, with its last words, if a program has ended by itself."""

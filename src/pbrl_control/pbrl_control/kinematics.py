@@ -107,6 +107,9 @@ class JointLimits:
 class RobotKinematics:
     """Forward kinematics, gripper Jacobians and limits, from the text of a URDF.
 
+    Attributes:
+        urdf: that text.
+
     Raises:
         ControlError: the text is no URDF, or a joint or frame that control needs is not in it.
     """
@@ -116,6 +119,7 @@ class RobotKinematics:
             whole = pin.buildModelFromXML(urdf)
         except (ValueError, RuntimeError) as error:
             raise ControlError(f"robot description: expected URDF text, got {urdf[:40]!r}: {error}") from error
+        self.urdf = urdf
         self._model = _without_wheels(whole)
         self._frames = {name: self._frame(name) for name in ("left_ft", "right_ft")}
         self._plates = {side: self._add_plates(side) for side in SIDES}

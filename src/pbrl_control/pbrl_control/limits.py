@@ -36,6 +36,7 @@ class BodyGate:
         self._upper = np.concatenate([each.upper - margin for each in both])
         speeds = [np.array([base.speed, base.yaw_rate]), *(arm.velocity_fraction * each.velocity for each in both)]
         self._ceiling = np.concatenate(speeds)
+        self._forward = min(base.speed, base.forward_speed)
         self._change = np.array([base.acceleration, base.yaw_acceleration, *[arm.acceleration] * 14])
 
     def stop(self) -> None:
@@ -54,6 +55,7 @@ class BodyGate:
         """
         low, high = np.empty(WIDTH), np.empty(WIDTH)
         velocity_range(self.last, joints, self._lower, self._upper, self._ceiling, self._change, LONGEST, dt, low, high)
+        high[0] = min(high[0], self._forward)
         return low, high
 
     def commit(self, velocity: Array, low: Array, high: Array) -> Array:

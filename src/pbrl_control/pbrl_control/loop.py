@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 from pbrl_control.controller import BodyController
 from pbrl_control.course import Course
 from pbrl_control.errors import ControlError
+from pbrl_control.fence import Fence
 from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.kinematics import RobotKinematics
-from pbrl_control.percept import Percept, holds_of
+from pbrl_control.percept import BodyShape, Percept, holds_of
+from pbrl_control.planar import Array
 from pbrl_control.push import GripperAnswer, Phase, PushCommand, PushExecutive
 from pbrl_control.settings import ControllerSettings
 from pbrl_control.types import BodyCommand, BodyState
@@ -54,6 +57,9 @@ class ControlLoop:
         settings: of the body controller.
         course: what the object of a plan does while it is held; None: the segments of a push plan.
 
+    Attributes:
+        fenced: why the fence holds the robot back now; empty: it does not.
+
     Raises:
         ControlError: a course beside an executive, which has its own; a plan that lacks one.
     """
@@ -71,7 +77,13 @@ class ControlLoop:
             )
         self.controller = BodyController(kinematics, settings or ControllerSettings())
         self.executive: Executive = PushExecutive(task, course) if isinstance(task, GraspPlan) else task
+        self._fence = Fence(kinematics.urdf, self.controller.settings.fence)
+        self.fenced = ""
         self._last: float | None = None
+
+    def told(self, bodies: Mapping[str, BodyShape], fixed: Mapping[str, Array]) -> None:
+        """Take in the scene: outlines by name, and the pose (3,) of what is built in [m, rad]."""
+        self._fence.told(bodies, fixed)
 
     def tick(self, now: float, percept: Percept) -> LoopCommand:
         """Return the commands for the time from `now` [s] on; call it at 100 Hz of the clock that `now` is of."""
@@ -86,6 +98,9 @@ class ControlLoop:
             return LoopCommand(BodyCommand(report=str(error)), push)
         holds = {side: replace(hold, expected=push.expected.get(side)) for side, hold in holds.items()}
         body = self.controller.tick(BodyState(percept.posture), push.twists, holds, percept.wrenches, dt)
+        self.fenced = self._fence.fault(now, percept, body)
+        if self.fenced:
+            body = self.controller.stand(self.fenced)
         return LoopCommand(body, push)
 
     def answer(self, answer: GripperAnswer) -> None:

@@ -13,6 +13,11 @@ import numpy as np
 from pbrl_control.planar import Array
 from pbrl_control.settings import WatchSettings
 
+SLOW_STREAM = 2.2
+"""Periods of a stream without which it is cut, where that is longer than the settings have it: slow is no fault."""
+FORGET = 0.1
+"""Share of each new period in what is kept of a stream's."""
+
 
 class Stream:
     """The last change of one stream, and how long the robot has moved since."""
@@ -20,6 +25,7 @@ class Stream:
     def __init__(self) -> None:
         self.seen: float | None = None
         self.moved = 0.0
+        self.period = 0.0
         self._value: Array | None = None
         self._before = 0.0
 
@@ -29,6 +35,9 @@ class Stream:
             self._value, self.moved = value.copy(), 0.0
         elif moving:
             self.moved += max(now - self._before, 0.0)
+        if self.seen is not None and now > self.seen:
+            since = now - self.seen
+            self.period += FORGET * (min(since, 2.0 * self.period) - self.period) if self.period else since
         self.seen = self._before = now
 
 
@@ -53,6 +62,19 @@ class SensorWatch:
             moving: whether the robot is told to move.
         """
         self._streams.setdefault(name, Stream()).feed(now, value, moving)
+
+    def cut(self, now: float, links: Iterable[str]) -> str:
+        """Return which of the streams that were there once says nothing any more, in a sentence; empty where none is.
+
+        A link that is cut stops the robot sooner than a tag that is hidden: nothing of what happens is known then.
+        """
+        for name in links:
+            stream = self._streams.get(name)
+            if stream is None or stream.seen is None:
+                continue
+            if now - stream.seen > max(self._settings.link, SLOW_STREAM * stream.period):
+                return f"{name}: expected samples, none for {now - stream.seen:.2f} s; is its source running?"
+        return ""
 
     def complaint(self, now: float, needed: Iterable[str]) -> str:
         """Return what is wrong with the streams that are needed, in a sentence; empty where nothing is."""

@@ -40,6 +40,7 @@ class BaseSettings(Section):
     """Limits of the differential base, and how it keeps what the arms carry in the middle of their workspace."""
 
     speed: Positive = 0.35  # [m/s]
+    forward_speed: Positive = 0.17  # [m/s] forwards: from more it would tip, were it to be at rest within 0.3 s
     yaw_rate: Positive = 0.5  # [rad/s]
     acceleration: Positive = 0.5  # [m/s^2]
     yaw_acceleration: Positive = 1.0  # [rad/s^2]
@@ -134,14 +135,31 @@ class ComplianceSettings(Section):
 class WatchSettings(Section):
     """When a stream that control needs cannot be trusted any more."""
 
-    lost: Positive = 1.0  # [s] without a sample
+    lost: Positive = 1.0  # [s] without a tag of what is held: it may be hidden for a moment
+    link: Positive = 0.14  # [s] without any tag at all, joint positions or a wrench: nobody sends any more
     frozen: Positive = 1.0  # [s] of motion with the same sample again and again
+
+
+class FenceSettings(Section):
+    """Places that neither the robot nor what it holds may enter.
+
+    Attributes:
+        keep_out: corners of each [m], `world`; /scene tells others, under names that begin with `keep_out_`.
+        clear: nearest that anything is sent to them [m].
+        graze: into those that /scene tells, which are wider than they are, one may come as far as this [m].
+        ahead: time for which a command is looked ahead: until what it leads to could have been braked [s].
+    """
+
+    keep_out: tuple[tuple[tuple[Finite, Finite], ...], ...] = ()
+    clear: Positive = 0.02
+    graze: NotNegative = 0.04
+    ahead: Positive = 0.3
 
 
 class ControllerSettings(Section):
     """Everything the body controller can be told."""
 
-    timeout: Positive = 0.2  # [s] a command older than this is no command
+    timeout: Positive = 0.07  # [s] a command older than this is no command
     method: Literal["program", "pseudo-inverse"] = "program"
     program: ProgramSettings = ProgramSettings()
     pseudo_inverse: PseudoInverseSettings = PseudoInverseSettings()
@@ -149,6 +167,7 @@ class ControllerSettings(Section):
     arm: ArmSettings = ArmSettings()
     compliance: ComplianceSettings = ComplianceSettings()
     watch: WatchSettings = WatchSettings()
+    fence: FenceSettings = FenceSettings()
     home: Planar = (0.74, 0.16, 0.0)  # x, y, yaw of the left gripper in `base` [m, rad]; right: mirrored
     nominal: Arm = (0.94, -1.13, -0.04, -1.65, 0.0, 1.20, 0.05)  # [rad] left; right: negated
     stowed: Arm = (1.9, -1.13, 0.0, -2.0, 0.12, 1.49, -0.06)  # [rad] left; right: negated

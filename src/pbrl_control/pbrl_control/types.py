@@ -90,6 +90,10 @@ class BodyCommand:
     right: Array = field(default_factory=lambda: np.zeros(7))
     report: str = ""
 
+    def moves(self) -> bool:
+        """Say whether anything is to move."""
+        return bool(self.base_v or self.base_w or np.any(self.left) or np.any(self.right))
+
     def arm(self, side: str) -> Array:
         """Return the (7,) joint velocities of one arm."""
         return self.left if side == "left" else self.right

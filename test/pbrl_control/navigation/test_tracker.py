@@ -20,7 +20,7 @@ from pbrl_control.navigation import (
 )
 from pbrl_control.settings import BaseSettings
 
-LIMITS = BaseSettings()
+LIMITS = BaseSettings(forward_speed=0.35)
 
 
 def bent(*, reverse: bool = False) -> BasePath:

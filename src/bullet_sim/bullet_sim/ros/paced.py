@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Protocol
 
+import numpy as np
 from pbrl_msgs.srv import GraspObject, ReleaseObject
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -23,6 +24,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64MultiArray
 
 from bullet_sim.errors import SimError
+from bullet_sim.faults import Faults, FaultyLinks
 from bullet_sim.grippers import GraspOutcome
 from bullet_sim.messages import LATCHED, to_messages
 from bullet_sim.ros.diagnostics import PaceDiagnostics
@@ -85,6 +87,8 @@ class PacedSimulator(Node):
         self._stop = stop
         self._heard = 0
         self._last_command: float | None = None
+        self._commands: dict[str, Callable[[Any], None]] = {}
+        self._faulty: FaultyLinks | None = None
 
     def declare_pace(self) -> None:
         """Declare the parameters of the pace.
@@ -128,7 +132,22 @@ class PacedSimulator(Node):
 
     def listen(self, kind: Any, topic: str, command: Callable[[Any], None]) -> None:
         """Obey the messages of a topic; what `command` raises SimError for is warned about and ignored."""
-        self.create_subscription(kind, topic, lambda message: self._obey(command, message), COMMAND_QOS)
+        self._commands[f"/{topic}"] = command
+
+        def heard(message: Any) -> None:
+            if self._faulty is None:
+                self._obey(command, message)
+            else:
+                self._heard += 1
+                self._faulty.send(self._session.time, f"/{topic}", message)
+
+        self.create_subscription(kind, topic, heard, COMMAND_QOS)
+
+    def fail(self, faults: Faults, seed: int) -> None:
+        """Let messages and clocks fail as a scene has it; `seed` of every draw."""
+        if faults.any:
+            self._faulty = FaultyLinks(faults, np.random.default_rng(seed))
+            self.get_logger().warning("faults are injected: messages or clocks fail on purpose, as the scene has it")
 
     def _obey(self, command: Callable[[Any], None], message: Any) -> None:
         self._heard += 1
@@ -161,10 +180,27 @@ class PacedSimulator(Node):
         while self._wanted() and not (self._duration and session.time >= self._duration):
             for observation in session.step():
                 for topic, message in to_messages(observation):
-                    self._outputs[topic].publish(message)
+                    self._tell(topic, message)
+            self._carry()
             if session.time >= next_listen:
                 next_listen = session.time + LISTEN_PERIOD
                 origin = self._keep_pace(origin)
+
+    def _tell(self, topic: str, message: Any) -> None:
+        if self._faulty is None:
+            self._outputs[topic].publish(message)
+        else:
+            self._faulty.send(self._session.time, topic, message)
+
+    def _carry(self) -> None:
+        """Deliver what faulty links let arrive now."""
+        if self._faulty is None:
+            return
+        for topic, message in self._faulty.due(self._session.time):
+            if topic in self._outputs:
+                self._outputs[topic].publish(message)
+            else:
+                self._obey(self._commands[topic], message)
 
     def _wanted(self) -> bool:
         return not self._stop.is_set() and self.context.ok()

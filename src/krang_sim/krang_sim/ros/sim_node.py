@@ -6,6 +6,7 @@ Its pace is that of `bullet_sim.ros.paced`. Runs that must be bit for bit the sa
 
 from __future__ import annotations
 
+import math
 import threading
 from pathlib import Path
 from typing import get_args
@@ -37,8 +38,9 @@ class SimNode(PacedSimulator):
         scene, seed, gui = self._declare()
         self.session = KrangSession(scene, seed=seed, gui=gui)
         self.start(self.session, message_types(self.session.tagged, self.session.cameras))
+        self.fail(scene.faults, seed)
         self.obey_arms(self.session)
-        self.listen(Twist, "cmd_vel", lambda message: self.session.command_base(message.linear.x, message.angular.z))
+        self.listen(Twist, "cmd_vel", self._command_base)
         self.listen(Float64MultiArray, "body_velocity_controller/commands", self._command_body)
 
     def _declare(self) -> tuple[Scene, int, bool]:
@@ -53,6 +55,15 @@ class SimNode(PacedSimulator):
         refuse_unknown(self)
         loaded = with_model(load_scene(scene), Path(model)) if model else load_scene(scene)
         return with_tags(loaded, tags) if tags else loaded, seed, gui
+
+    def _command_base(self, message: Twist) -> None:
+        linear, angular = message.linear, message.angular
+        numbers = (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+        if not all(map(math.isfinite, numbers)):  # whoever sends these is not to be believed in the others either
+            raise KrangError(f"base command: expected finite numbers, got {list(numbers)}; send zeros to stop")
+        self.session.command_base(linear.x, angular.z)
+        if self.session.halted:
+            self.get_logger().warning(self.session.halted, throttle_duration_sec=1.0)
 
     def _command_body(self, message: Float64MultiArray) -> None:
         if len(message.data) != 2:

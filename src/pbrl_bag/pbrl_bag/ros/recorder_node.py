@@ -123,7 +123,7 @@ class RecorderNode(Node):
 
 def main() -> None:
     """Record until SIGINT or SIGTERM."""
-    node = None
+    node, fault = None, ""
     try:
         stop = init_until_signal()
         node = RecorderNode()
@@ -131,25 +131,27 @@ def main() -> None:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except BagError as error:
-        print(f"recorder_node: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
+        fault = str(error)
     finally:
         if node is not None:
-            _finish(node)
+            fault = _finish(node) or fault
         rclpy.try_shutdown()
+    if fault:
+        print(f"recorder_node: {' '.join(fault.split())}", file=sys.stderr)
+        raise SystemExit(2)
 
 
-def _finish(node: RecorderNode) -> None:
-    """Close the bag, so that it has its footer, whatever ended the recording."""
+def _finish(node: RecorderNode) -> str:
+    """Close the bag, so that it has its footer, whatever ended the recording; return what is wrong, or nothing."""
     try:
         node.drain()
         node.writer.close()
-        print(f"recorded {node.writer.message_count} messages into {node.output}", file=sys.stderr)
     except BagError as error:
-        print(f"recorder_node: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
+        return str(error)
     finally:
         node.destroy_node()
+    print(f"recorded {node.writer.message_count} messages into {node.output}", file=sys.stderr)
+    return ""
 
 
 if __name__ == "__main__":

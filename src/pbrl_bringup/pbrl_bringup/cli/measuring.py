@@ -16,7 +16,8 @@ def bench(
         str,
         typer.Argument(
             help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose, calibration, concealed, tags, control, "
-            "cart, namo, lattice, next-experiment, foreign, played-again, two-robots, view, mismatch, scale or fuzz."
+            "cart, namo, lattice, next-experiment, foreign, played-again, two-robots, view, mismatch, scale, fuzz, "
+            "kills, fence, soak."
         ),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,
@@ -30,7 +31,10 @@ def bench(
         ),
     ] = None,
     most: Annotated[
-        int | None, typer.Option(min=1, help="Recordings an effect at most, and ten times clean ones; hostile inputs.")
+        int | None,
+        typer.Option(
+            min=1, help="Recordings an effect at most, and ten times clean ones; hostile inputs; nodes struck."
+        ),
     ] = None,
     minutes: Annotated[
         float | None, typer.Option(min=0.0, help="After which no case is begun; what there is is reported.")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
+from functools import partial
 from pathlib import Path
 
 from pbrl_bringup.graph import (
@@ -15,6 +16,7 @@ from pbrl_bringup.graph import (
     wait_ready,
     with_parameters,
 )
+from pbrl_bringup.processes import Programs
 from pbrl_bringup.ros.client import GraphClient
 from pbrl_bringup.terminal import say
 
@@ -34,9 +36,10 @@ def command(
         node_command(name, node, robot)  # errors before a word is said
     number = int(os.environ.get("ROS_DOMAIN_ID", "0")) if domain is None else domain
     say(f"pbrl: {chosen.description.strip()}")
+    spare = {name for name, node in chosen.nodes.items() if node.optional}
     with (
         running_graph(chosen, logs, number, robot) as programs,
-        GraphClient(number, programs.check, robot) as client,
+        GraphClient(number, partial(_check, programs, spare), robot) as client,
     ):
         wait_ready(chosen, client)
         try:  # Ctrl-C may come as soon as it is named
@@ -46,3 +49,11 @@ def command(
         except KeyboardInterrupt:
             say("pbrl: stopping")
     return 0
+
+
+def _check(programs: Programs, spare: Container[str]) -> None:
+    """Raise a BringupError if a node has ended by itself; of one that is optional it is told, and the rest goes on."""
+    for program in programs.let_go(spare):
+        say(f"pbrl: {program.name} ended with exit code {program.process.returncode}: {program.last_line()}")
+        say("pbrl: the other nodes go on without it")
+    programs.check()

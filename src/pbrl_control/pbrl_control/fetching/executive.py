@@ -275,7 +275,7 @@ class FetchExecutive:
     def _drive_time(self, candidate: GraspCandidate) -> float:
         """Return about how long the way takes [s]: a shorter one with half a turn more is no better."""
         limits, path = self._controller.base, candidate.path
-        return path.length / limits.speed + path.turning / limits.yaw_rate
+        return path.length / min(limits.speed, limits.forward_speed) + path.turning / limits.yaw_rate
 
     def _tried(self, candidate: GraspCandidate) -> bool:
         apart = self._settings.apart

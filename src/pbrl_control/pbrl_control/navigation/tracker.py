@@ -151,9 +151,10 @@ class PathTracker:
     def _command(self, v: float, omega: float, dt: float, status: TrackStatus, reason: str = "") -> TrackCommand:
         """Bring the velocities there as fast as the base's limits let it."""
         limits = self._limits
-        most = np.array([limits.speed, limits.yaw_rate])
+        least = -np.array([limits.speed, limits.yaw_rate])
+        most = np.array([min(limits.speed, limits.forward_speed), limits.yaw_rate])
         change = dt * np.array([limits.acceleration, limits.yaw_acceleration])
-        wanted = np.clip([v, omega], -most, most)
+        wanted = np.clip([v, omega], least, most)
         self._velocity = self._velocity + np.clip(wanted - self._velocity, -change, change)
         return TrackCommand(float(self._velocity[0]), float(self._velocity[1]), status, reason, self._struck)
 
@@ -239,7 +240,8 @@ class PathTracker:
         x, y = here[:2] - leg.start
         beside = ahead[0] * y - ahead[1] * x  # to the left of the line, as the base faces
         speed = self._ending(abs(left), turning=False) * max(math.cos(error), 0.0)
-        v = math.copysign(speed, -left if leg.reverse else left)
+        v = min(math.copysign(speed, -left if leg.reverse else left), self._limits.forward_speed)
+        speed = abs(v)
         k = 1.0 / self._settings.recovery
         omega = 2.0 * k * speed * error - k**2 * v * beside
         most = self._limits.yaw_rate

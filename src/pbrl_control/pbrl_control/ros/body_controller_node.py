@@ -11,6 +11,7 @@ done by it.
 from __future__ import annotations
 
 import gc
+import math
 import threading
 import time
 from dataclasses import replace
@@ -32,15 +33,17 @@ from pbrl_bag.ros.running import run_node
 from pbrl_bag.ros.stopping import spin_in_order
 from pbrl_control.controller import BodyController
 from pbrl_control.errors import ControlError
+from pbrl_control.fence import Fence
 from pbrl_control.installed import params_folder
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
 from pbrl_control.limits import LONGEST
-from pbrl_control.percept import Grip, Percept, Tag, gripper_tag, holds_of
+from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag, holds_of
 from pbrl_control.planar import Array
 from pbrl_control.realtime import take_priority
 from pbrl_control.ros.conversions import (
     arm_to_msg,
     base_to_msg,
+    bodies_from_msg,
     expected_from_msg,
     grips_from_msg,
     movable_from_msg,
@@ -50,6 +53,7 @@ from pbrl_control.ros.conversions import (
     twist_from_msg,
     wrench_from_msg,
 )
+from pbrl_control.ros.floor_conversions import fixed_from_msg
 from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
 from pbrl_control.sensor_watch import SensorWatch
 from pbrl_control.settings import ControllerSettings, load_section
@@ -58,6 +62,8 @@ from pbrl_control.watchdog import Watchdog
 from pbrl_control.whole_body.prepare import compile_kernels
 
 JOINTS = "joint positions"
+TAGS = "tags"
+SIGN_OF_LIFE = 0.2  # [s of the wall clock] between two while nothing is commanded
 STIRS = 0.02  # [rad/s] of a joint, at which its position has to change
 
 
@@ -76,6 +82,9 @@ class BodyControllerNode(Node):
         self._settings = load_section(file, ControllerSettings, "settings")
         compile_kernels(self._settings)  # before anybody can see this node: who sees it may count on its ticks
         self._controller: BodyController | None = None
+        self._fence: Fence | None = None
+        self._bodies: dict[str, BodyShape] = {}
+        self._fixed: dict[str, Array] = {}
         self._watchdog = Watchdog(self._settings.timeout)
         self._watch = SensorWatch(self._settings.watch)
         self._emergency = False
@@ -89,6 +98,7 @@ class BodyControllerNode(Node):
         self._last: float | None = None
         self._moving = False
         self._in_motion = self._arms_in_motion = False
+        self._told = -math.inf
         self._report = ""
         self._diagnostics = Diagnostics(self, self._doing, lambda: self._report, self._numbers)
         self._create_publishers()
@@ -135,13 +145,18 @@ class BodyControllerNode(Node):
     def _on_description(self, message: String) -> None:
         try:
             self._controller = BodyController(RobotKinematics(message.data), self._settings)
+            self._fence = Fence(message.data, self._settings.fence)
+            self._fence.told(self._bodies, self._fixed)
         except ControlError as error:
             self._controller = None
             self.get_logger().error(str(error))
 
     def _on_scene(self, message: Scene) -> None:
+        self._bodies, self._fixed = bodies_from_msg(message), fixed_from_msg(message)
         for name in movable_from_msg(message):
             self._listen_to_tag(name)
+        if self._fence is not None:
+            self._fence.told(self._bodies, self._fixed)
 
     def _on_grasps(self, message: Grasps) -> None:
         self._grips = grips_from_msg(message)
@@ -162,6 +177,7 @@ class BodyControllerNode(Node):
 
     def _on_tag(self, name: str, message: PoseStamped) -> None:
         tag = self._tags[name] = tag_from_msg(message)
+        self._watch.feed(TAGS, self._now(), np.array([tag.time]), moving=False)
         self._watch.feed(_tag_stream(name), self._now(), np.array([tag.time]), moving=self._in_motion)
 
     def _on_joints(self, message: JointState) -> None:
@@ -189,8 +205,11 @@ class BodyControllerNode(Node):
             lost = self._lost_stream(posture) if twists else ""
             if lost:
                 return controller.stand(lost)
-            holds = self._with_expected(holds_of(Percept(posture, self._tags, self._wrenches, self._grips)))
+            percept = Percept(posture, self._tags, self._wrenches, self._grips, self._bodies)
+            holds = self._with_expected(holds_of(percept))
             command = controller.tick(BodyState(posture), twists, holds, self._wrenches, dt)
+            if self._fence is not None and (fault := self._fence.fault(self._now(), percept, command)):
+                return controller.stand(fault)
         except ControlError as error:
             return controller.stand(str(error))
         return command if twists or command.report else None
@@ -207,14 +226,15 @@ class BodyControllerNode(Node):
         """Return which stream that is needed cannot be trusted, and why; empty where all can."""
         now = self._now()
         self._watch.feed(JOINTS, now, posture.vector(), moving=self._arms_in_motion)
-        needed = [JOINTS]
+        needed, links = [JOINTS], [TAGS, *(_wrench_stream(side) for side in self._grips)]
         for side, grip in self._grips.items():
             needed += [_wrench_stream(side), _tag_stream(grip.object), _tag_stream(gripper_tag(side))]
-        return self._watch.complaint(now, needed)
+        return self._watch.cut(now, links) or self._watch.complaint(now, needed)
 
     def _send(self, command: BodyCommand | None, controller: BodyController) -> None:
         """Publish a command; when commands cease, one that stops everything, and then leave the drives alone."""
         if command is None and not self._moving:
+            self._give_a_sign_of_life(controller)
             return
         self._moving = command is not None
         command = command or BodyCommand()
@@ -229,6 +249,13 @@ class BodyControllerNode(Node):
             self._status.publish(String(data=command.report or "ok"))
             if command.report:
                 self.get_logger().warning(command.report)
+
+    def _give_a_sign_of_life(self, controller: BodyController) -> None:
+        """Tell the share now and then though nothing is commanded: who commands may wait for this before he does."""
+        now = time.monotonic()
+        if now - self._told >= SIGN_OF_LIFE:
+            self._told = now
+            self._share.publish(Float64(data=controller.share))
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9

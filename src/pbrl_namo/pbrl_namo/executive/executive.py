@@ -266,10 +266,12 @@ class NamoExecutive:
     def _order(self, step: Step, percept: Percept) -> Order:
         """Return a step as a command: at rest wherever nothing is to move."""
         ended = self.state in ENDED
+        # Whoever is paused says nothing: without commands the controller halts, which is sooner than it comes to rest.
+        silent = ended or self.state == State.PAUSED
         self.phase = self.phase if ended else step.phase
         self.sentence = step.status
         moving = self.state in MOVING and step.twists and all(twist.finite() for twist in step.twists.values())
-        twists = {} if ended else step.twists if moving else rest(percept)
+        twists = {} if silent else step.twists if moving else rest(percept)
         return Order(self.phase, step.status, twists, step.requests, step.expected, self.state)
 
 

@@ -1,0 +1,1 @@
+"""Nodes of a running graph killed and frozen on purpose, and what became of robot, mission and recording."""

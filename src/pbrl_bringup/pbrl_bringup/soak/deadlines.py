@@ -1,0 +1,95 @@
+"""How punctual nodes were, by a recording: commands by the simulated clock that was heard before them."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_bag.mcap_file import McapFile
+from pbrl_bag.metadata import files_of_bag
+
+Array = NDArray[np.float64]
+
+CLOCK = "/clock"
+PERIODS: Mapping[str, float] = {"/cmd_vel": 0.01, "/object_twist_command": 0.02}
+"""Of what is sent again and again while the robot is commanded [s of simulated time]."""
+ALLOWED = 2.0
+"""Periods from one to the next that are in time: the clock itself is told every 10 ms."""
+PAUSE = 0.5
+"""[s] of silence after which nothing was commanded: no deadline ran."""
+STAMP = struct.Struct("<iI")
+HEAD = 4
+"""[bytes] before the fields of a message in CDR."""
+
+
+@dataclass(frozen=True)
+class Ticks:
+    """How punctual one topic was.
+
+    Attributes:
+        count: of ticks that were due.
+        missed: share of them that did not come in time.
+        longest: time from one to the next [s of simulated time].
+        gap: longest time in which nothing at all was recorded though the clock went on [s of simulated time].
+        minutes: of the wall clock since the beginning, one after another.
+        missed_by_minute: share in each.
+    """
+
+    count: int
+    missed: float
+    longest: float
+    gap: float
+    minutes: tuple[float, ...]
+    missed_by_minute: tuple[float, ...]
+
+
+def read_ticks(bag: Path) -> dict[str, Ticks]:
+    """Return how punctual each topic of `PERIODS` was.
+
+    Raises:
+        BagError: the recording cannot be read.
+    """
+    now, gap, begin = 0.0, 0.0, None
+    heard: dict[str, list[tuple[float, float]]] = {topic: [] for topic in PERIODS}
+    for path in files_of_bag(bag):
+        for message in McapFile(path).messages():
+            if message.topic == CLOCK:
+                second, nano = STAMP.unpack_from(message.data, HEAD)
+                before, now = now, second + 1e-9 * nano
+                gap = max(gap, now - before)  # a clock that is set back is another room's
+            elif message.topic in heard:
+                begin = message.log_time if begin is None else begin
+                heard[message.topic].append(((message.log_time - begin) / 60e9, now))
+    return {topic: ticks_of(np.array(rows).reshape(-1, 2), PERIODS[topic], gap) for topic, rows in heard.items()}
+
+
+def ticks_of(rows: Array, period: float, gap: float) -> Ticks:
+    """Return how punctual a topic was.
+
+    Args:
+        rows: (n, 2) when each message came, on the wall clock [min] and on the simulated one [s].
+        period: in which they are due [s].
+        gap: of the recording [s].
+    """
+    since = np.diff(rows[:, 1])
+    going = (since >= 0.0) & (since < PAUSE)
+    minute, since = rows[1:, 0][going], since[going]
+    if not len(since):
+        return Ticks(0, 0.0, 0.0, gap, (), ())
+    due = np.maximum(since / period, 1.0)
+    late = np.where(since > ALLOWED * period + 1e-6, since / period - 1.0, 0.0)
+    bins = np.floor(minute).astype(int)
+    each = [(late[bins == k].sum() / due[bins == k].sum()) for k in np.unique(bins)]
+    return Ticks(
+        round(due.sum()),
+        float(late.sum() / due.sum()),
+        float(since.max()),
+        gap,
+        tuple(map(float, np.unique(bins))),
+        tuple(map(float, each)),
+    )
