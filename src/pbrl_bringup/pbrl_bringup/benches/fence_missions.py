@@ -244,8 +244,8 @@ def _by_wheels(rng: np.random.Generator, session: KrangSession, number: int, tar
             until = session.time + rng.uniform(0.3, 2.0)
             rates = rng.uniform(-0.6, 0.6, 14) * (rng.uniform() < 0.5)
         session.command_base(*wild_drive(base_of(session), target))
-        session.command_arm("left", rates[:7])
-        session.command_arm("right", rates[7:])
+        session.command_arm("left", rates[:7].tolist())
+        session.command_arm("right", rates[7:].tolist())
         session.step()
         fenced |= bool(session.halted)
         if session.time >= due:

@@ -9,16 +9,13 @@ import typer
 
 from pbrl_bringup.cli.handing import hand_over
 from pbrl_bringup.cli.options import Quick, Scheduler, Seed
+from pbrl_bringup.measurable import BENCHES, EXPERIMENTS
 
 
 def bench(
     name: Annotated[
         str,
-        typer.Argument(
-            help="sim, wheel, cabinet, recorder, mcap, kernel, inference, pose, calibration, concealed, tags, control, "
-            "cart, namo, lattice, next-experiment, foreign, played-again, two-robots, view, mismatch, scale, fuzz, "
-            "kills, fence, soak."
-        ),
+        typer.Argument(help=f"One of {', '.join(BENCHES)}."),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/bench/NAME.")] = None,
     seed: Seed = 0,
@@ -50,10 +47,7 @@ def bench(
 def experiment(
     name: Annotated[
         str,
-        typer.Argument(
-            help="shopping-cart, shopping-cart-noisy, apartment, sample-efficiency, noise, robot-fits, limits or "
-            "contact."
-        ),
+        typer.Argument(help=f"One of {', '.join(EXPERIMENTS)}."),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for report.json. Default: out/experiment/NAME.")] = None,
     seed: Seed = 0,
