@@ -1,4 +1,4 @@
-"""How punctual nodes were, by a recording: commands by the simulated clock that was heard before them."""
+"""How punctual nodes were, by a recording: each command by the simulated clock that was told before it was sent."""
 
 from __future__ import annotations
 
@@ -54,18 +54,26 @@ def read_ticks(bag: Path) -> dict[str, Ticks]:
     Raises:
         BagError: the recording cannot be read.
     """
-    now, gap, begin = 0.0, 0.0, None
-    heard: dict[str, list[tuple[float, float]]] = {topic: [] for topic in PERIODS}
+    clock: list[tuple[float, float]] = []
+    sent: dict[str, list[float]] = {topic: [] for topic in PERIODS}
     for path in files_of_bag(bag):
         for message in McapFile(path).messages():
+            when = message.publish_time / 1e9  # when it was heard is the recorder's own affair
             if message.topic == CLOCK:
                 second, nano = STAMP.unpack_from(message.data, HEAD)
-                before, now = now, second + 1e-9 * nano
-                gap = max(gap, now - before)  # a clock that is set back is another room's
-            elif message.topic in heard:
-                begin = message.log_time if begin is None else begin
-                heard[message.topic].append(((message.log_time - begin) / 60e9, now))
-    return {topic: ticks_of(np.array(rows).reshape(-1, 2), PERIODS[topic], gap) for topic, rows in heard.items()}
+                clock.append((when, second + 1e-9 * nano))
+            elif message.topic in sent:
+                sent[message.topic].append(when)
+    wall, simulated = np.array(sorted(clock)).reshape(-1, 2).T
+    gap = float(np.diff(simulated, prepend=0.0).max(initial=0.0))  # a clock that is set back is another room's
+    found = {}
+    for topic, times in sent.items():
+        when = np.sort(times)
+        when = when[when >= wall[0]] if len(wall) else when[:0]
+        shown = simulated[np.searchsorted(wall, when, side="right") - 1]
+        rows = np.column_stack(((when - when[0]) / 60.0, shown)) if len(when) else np.zeros((0, 2))
+        found[topic] = ticks_of(rows, PERIODS[topic], gap)
+    return found
 
 
 def ticks_of(rows: Array, period: float, gap: float) -> Ticks:
