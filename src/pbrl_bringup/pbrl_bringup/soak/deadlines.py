@@ -18,8 +18,11 @@ Array = NDArray[np.float64]
 CLOCK = "/clock"
 PERIODS: Mapping[str, float] = {"/cmd_vel": 0.01, "/object_twist_command": 0.02}
 """Of what is sent again and again while the robot is commanded [s of simulated time]."""
-ALLOWED = 2.0
-"""Periods from one to the next that are in time: the clock itself is told every 10 ms."""
+DEADLINES: Mapping[str, float] = {"/cmd_vel": 0.1, "/object_twist_command": 0.07}
+"""After which who obeys takes it that nobody commands any more, and halts [s of simulated time]."""
+UNEVEN = 2.0
+"""Periods from one to the next beyond which a tick is called uneven: the clock itself is told every 10 ms."""
+SMALL = 1e-6
 PAUSE = 0.5
 """[s] of silence after which nothing was commanded: no deadline ran."""
 STAMP = struct.Struct("<iI")
@@ -33,19 +36,21 @@ class Ticks:
 
     Attributes:
         count: of ticks that were due.
-        missed: share of them that did not come in time.
+        missed: share of them that came after the deadline.
+        uneven: share of them that came later than two periods after the one before.
         longest: time from one to the next [s of simulated time].
         gap: longest time in which nothing at all was recorded though the clock went on [s of simulated time].
         minutes: of the wall clock since the beginning, one after another.
-        missed_by_minute: share in each.
+        uneven_by_minute: share of uneven ones in each.
     """
 
     count: int
     missed: float
+    uneven: float
     longest: float
     gap: float
     minutes: tuple[float, ...]
-    missed_by_minute: tuple[float, ...]
+    uneven_by_minute: tuple[float, ...]
 
 
 def read_ticks(bag: Path) -> dict[str, Ticks]:
@@ -72,30 +77,32 @@ def read_ticks(bag: Path) -> dict[str, Ticks]:
         when = when[when >= wall[0]] if len(wall) else when[:0]
         shown = simulated[np.searchsorted(wall, when, side="right") - 1]
         rows = np.column_stack(((when - when[0]) / 60.0, shown)) if len(when) else np.zeros((0, 2))
-        found[topic] = ticks_of(rows, PERIODS[topic], gap)
+        found[topic] = ticks_of(rows, PERIODS[topic], DEADLINES[topic], gap)
     return found
 
 
-def ticks_of(rows: Array, period: float, gap: float) -> Ticks:
+def ticks_of(rows: Array, period: float, deadline: float, gap: float) -> Ticks:
     """Return how punctual a topic was.
 
     Args:
         rows: (n, 2) when each message came, on the wall clock [min] and on the simulated one [s].
         period: in which they are due [s].
+        deadline: from one to the next [s].
         gap: of the recording [s].
     """
     since = np.diff(rows[:, 1])
     going = (since >= 0.0) & (since < PAUSE)
     minute, since = rows[1:, 0][going], since[going]
     if not len(since):
-        return Ticks(0, 0.0, 0.0, gap, (), ())
+        return Ticks(0, 0.0, 0.0, 0.0, gap, (), ())
     due = np.maximum(since / period, 1.0)
-    late = np.where(since > ALLOWED * period + 1e-6, since / period - 1.0, 0.0)
+    late, uneven = since > deadline + SMALL, since > UNEVEN * period + SMALL
     bins = np.floor(minute).astype(int)
-    each = [(late[bins == k].sum() / due[bins == k].sum()) for k in np.unique(bins)]
+    each = [(uneven[bins == k].sum() / due[bins == k].sum()) for k in np.unique(bins)]
     return Ticks(
         round(due.sum()),
         float(late.sum() / due.sum()),
+        float(uneven.sum() / due.sum()),
         float(since.max()),
         gap,
         tuple(map(float, np.unique(bins))),
