@@ -106,7 +106,7 @@ def rows_of(outcomes: Sequence[Outcome]) -> list[Row]:
 
 def cells(outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
     """Return the rows of the table: one a node and way."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for node, way in sorted({(each.node, each.way) for each in outcomes}):
         own = [each for each in outcomes if (each.node, each.way) == (node, way) and each.mission != NOT_MET]
         rests = [each.rest for each in own if each.rest is not None]

@@ -73,10 +73,10 @@ def read_ticks(bag: Path) -> dict[str, Ticks]:
     gap = float(np.diff(simulated, prepend=0.0).max(initial=0.0))  # a clock that is set back is another room's
     found = {}
     for topic, times in sent.items():
-        when = np.sort(times)
-        when = when[when >= wall[0]] if len(wall) else when[:0]
-        shown = simulated[np.searchsorted(wall, when, side="right") - 1]
-        rows = np.column_stack(((when - when[0]) / 60.0, shown)) if len(when) else np.zeros((0, 2))
+        ordered = np.sort(times)
+        ordered = ordered[ordered >= wall[0]] if len(wall) else ordered[:0]
+        shown = simulated[np.searchsorted(wall, ordered, side="right") - 1]
+        rows = np.column_stack(((ordered - ordered[0]) / 60.0, shown)) if len(ordered) else np.zeros((0, 2))
         found[topic] = ticks_of(rows, PERIODS[topic], DEADLINES[topic], gap)
     return found
 
