@@ -109,3 +109,13 @@ def test_it_is_told_on_the_usual_topic_of_what_came_in_the_namespace(node: Node)
     said = values(heard[-1].status[0])
     assert float(said["/odom rate [Hz]"]) > 0.0
     assert said["/tf_static age [s]"] == "never heard" and "/tf_static rate [Hz]" not in said
+
+
+def test_a_node_that_has_a_namesake_says_so_until_it_is_gone(node: Node) -> None:
+    told = Diagnostics(node)
+    assert told.status(time.monotonic()).level != DiagnosticStatus.ERROR
+    other = Node("watched", context=node.context, namespace="/robot_1", enable_rosout=False)
+    status = told.status(time.monotonic())
+    assert (status.level, "2 nodes are called /robot_1/watched" in status.message) == (DiagnosticStatus.ERROR, True)
+    other.destroy_node()
+    assert told.status(time.monotonic()).level != DiagnosticStatus.ERROR

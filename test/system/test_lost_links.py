@@ -26,7 +26,8 @@ FAULTS = {
     "/cmd_ve*": "nan: 1.0",
     "/cmd_v*": "late: 30.0",
 }
-RESTS, AT_REST, DRIVES = 0.3, 0.01, 0.08  # [s], [m/s], [m/s]
+RESTS, AT_REST, DRIVES = 0.3, 0.01, 0.03  # [s], [m/s], [m/s]: where the machine is busy it drives by fits and starts
+RATE = 0.5
 SCENE = """
 name: lost_links
 room: {outline: [[-2.0, -2.0], [8.0, -2.0], [8.0, 2.0], [-2.0, 2.0]]}
@@ -90,7 +91,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driver]:
     scene.write_text(SCENE + "".join(rows).replace("/ar_tags/*:", '"/ar_tags/*":'), encoding="utf-8")
     graph = load_graph("namo")
     graph = graph.model_copy(update={"nodes": {name: graph.nodes[name] for name in ("sim", "controller")}})
-    graph = with_parameters(graph, {"sim.scene": str(scene)})
+    graph = with_parameters(graph, {"sim.scene": str(scene), "sim.rate": str(RATE)})
     with free_domain() as domain, running_graph(graph, folder / "logs", domain) as programs:
         context = Context()
         rclpy.init(context=context, domain_id=domain)

@@ -1,7 +1,7 @@
 """Links and clocks that fail on purpose: what a simulator publishes and obeys comes late, twice, or not at all.
 
-A scene's `faults:` says which topics, how, and from when on. Room and robot are none the worse, only what is said of
-them and to them is. No ROS here: messages are whatever has fields.
+A scene's `faults:` says which topics, how, and from when on. Room and robot are none the worse; what is said of them
+and to them is. No ROS here: messages are whatever has fields.
 """
 
 from __future__ import annotations

@@ -76,6 +76,7 @@ class Diagnostics:
     ) -> None:
         self._node, self._doing, self._trouble, self._numbers = node, doing, trouble, numbers
         self._inputs: dict[str, Input] = {}
+        self._alone = True
         self._out = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         (runs_in or node).create_timer(PERIOD, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -137,7 +138,7 @@ class Diagnostics:
 
     def _verdict(self, missing: list[str], silent: list[str]) -> tuple[bytes, str]:
         """Return the level and the sentence: the worst that there is."""
-        trouble = self._trouble()
+        trouble = self._trouble() or self._namesake()
         if trouble:
             return ERROR, trouble
         if silent:
@@ -145,6 +146,22 @@ class Diagnostics:
         if missing:
             return WARN, f"waits for {', '.join(missing)}"
         return OK, self._doing() or "ok"
+
+    def _namesake(self) -> str:
+        """Return that another node has this one's name, in a sentence; empty where none has.
+
+        Both would command the same robot, and each would hear the answers to the other's requests.
+        """
+        own = (self._node.get_name(), self._node.get_namespace())
+        count = self._node.get_node_names_and_namespaces().count(own)
+        if count < 2:
+            self._alone = True
+            return ""
+        trouble = f"{count} nodes are called {self._node.get_fully_qualified_name()}: stop one, or rename it"
+        if self._alone:
+            self._alone = False
+            self._node.get_logger().error(trouble)
+        return trouble
 
     def _tell(self) -> None:
         message = DiagnosticArray(status=[self.status(time.monotonic())])

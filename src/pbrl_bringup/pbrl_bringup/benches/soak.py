@@ -111,7 +111,15 @@ def rows_of(
         at_most("file handles, most that a node has gained", max(t.end - t.begin for t in handles.values()), "1", 0),
         at_most("threads, most that a node has gained", max(t.end - t.begin for t in threads.values()), "1", 0),
         *(
-            at_most(f"ticks of {name} that came late", each.missed, "1", MISSED, ticks=each.count, longest=each.longest)
+            at_most(
+                f"deadlines of {name} missed, share",
+                each.missed,
+                "1",
+                MISSED,
+                ticks=each.count,
+                longest=each.longest,
+                uneven=each.uneven,
+            )
             for name, each in ticks.items()
         ),
         at_most("longest gap in the recording while a simulator ran", max(t.gap for t in ticks.values()), "s", GAP),
@@ -128,10 +136,10 @@ def draw(out: Path, samples: Sequence[Sample], ticks: Mapping[str, Ticks]) -> Pa
         handles.plot(minutes, [each.handles for each in own], color=colour, label=f"{node}, handles")
         handles.plot(minutes, [each.threads for each in own], color=colour, linestyle=":", label="threads")
     for name, each in ticks.items():
-        late.plot(each.minutes, 100.0 * np.asarray(each.missed_by_minute), label=name)
+        late.plot(each.minutes, 100.0 * np.asarray(each.uneven_by_minute), label=name)
     _name(memory, "memory [MiB]")
     _name(handles, "handles, and threads (dotted)")
-    _name(late, "late ticks [%]")
+    _name(late, "ticks later than two periods [%]")
     memory.legend(frameon=False, fontsize=8)
     late.legend(frameon=False, fontsize=8)
     return save(figure, out)

@@ -20,6 +20,9 @@ from pbrl_bringup.processes import Programs
 from pbrl_bringup.ros.client import GraphClient
 from pbrl_bringup.terminal import say
 
+DISCOVERED = 1.0
+"""[s] in which a node that runs in the domain already is found."""
+
 
 def command(
     graph: str, settings: Sequence[str], optional: Sequence[str], namespace: str, domain: int | None, logs: Path
@@ -27,7 +30,8 @@ def command(
     """Start a graph, say when each node is ready, and stay until Ctrl-C or until a node ends.
 
     Raises:
-        BringupError: no such graph, node or parameter; a name that is none; a node that ends by itself.
+        BringupError: no such graph, node or parameter; a name that is none; a node that is there already, or that ends
+            by itself.
     """
     robot = parse_namespace(namespace)
     logs /= robot.strip("/")
@@ -36,6 +40,8 @@ def command(
         node_command(name, node, robot)  # errors before a word is said
     number = int(os.environ.get("ROS_DOMAIN_ID", "0")) if domain is None else domain
     say(f"pbrl: {chosen.description.strip()}")
+    with GraphClient(number, namespace=robot) as client:
+        client.wait_for_none_of(chosen.nodes, DISCOVERED)
     spare = {name for name, node in chosen.nodes.items() if node.optional}
     with (
         running_graph(chosen, logs, number, robot) as programs,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from types import TracebackType
 from typing import Any, Self
 
@@ -71,6 +71,23 @@ class GraphClient:
         self._executor.shutdown()
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
+
+    def wait_for_none_of(self, names: Collection[str], seconds: float) -> None:
+        """Look for a while whether nodes of some names are there already.
+
+        Raises:
+            BringupError: one is.
+        """
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            there = {(name, space) for name, space in self._node.get_node_names_and_namespaces()}
+            for name in names:
+                if (name, self._namespace or "/") in there:
+                    raise BringupError(
+                        f"a node {self.on_the_wire('/' + name)} runs in this domain already; stop the other graph, or "
+                        f"give this one a --namespace or --domain of its own"
+                    )
+            self._executor.spin_once(timeout_sec=SPIN)
 
     def listen(self, kind: type, topic: str, *, latched: bool = True) -> Heard:
         """Subscribe, and return what holds the last message."""

@@ -104,7 +104,7 @@ def in_rooms(folder: Path, seed: int, length: float) -> tuple[list[Room], list[S
                 path = folder / f"room_{number:03d}.yaml"
                 write_text(path, yaml.safe_dump(json.loads(scene.model_dump_json(exclude_unset=True))))
                 sim = graph.nodes["sim"].model_copy(
-                    update={"parameters": {"scene": str(path.resolve()), "seed": number}}
+                    update={"parameters": {"scene": str(path.resolve()), "seed": number, "rate": RATE}}
                 )
                 programs.start("sim", node_command("sim", sim))
                 rooms.append(_one(client, status, clock, number, goal, mission, samples))
