@@ -128,7 +128,7 @@ def test_commands_move_the_robot_and_late_listeners_get_the_scene(start, listene
     names = wait_for(listener, JointState, "/joint_states").name
     assert len(names) == 18
     drive, arm = Twist(), Float64MultiArray(data=[0.1] + 6 * [0.0])
-    drive.linear.x = 0.2
+    drive.linear.x = 0.15
     base = listener.create_publisher(Twist, "/cmd_vel", 1)
     left = listener.create_publisher(Float64MultiArray, "/left_arm_velocity_controller/commands", 1)
     repeat = listener.create_timer(0.005, lambda: (base.publish(drive), left.publish(arm)))
@@ -136,7 +136,7 @@ def test_commands_move_the_robot_and_late_listeners_get_the_scene(start, listene
     def moves(joint: str, speed: float) -> Callable:
         return lambda message: message.velocity[names.index(joint)] > 0.9 * speed
 
-    wait_for(listener, JointState, "/joint_states", moves("lwheel", 0.2 / 0.267))
+    wait_for(listener, JointState, "/joint_states", moves("lwheel", 0.15 / 0.267))
     wait_for(listener, JointState, "/joint_states", moves("LJ1", 0.1))
     listener.destroy_timer(repeat)
     wait_for(listener, JointState, "/joint_states", lambda message: max(map(abs, message.velocity)) < 1e-3)

@@ -171,7 +171,7 @@ def test_with_every_command_it_says_how_much_of_it_is_done(spin_with, push_postu
     until(lambda: world.shares[-1] > 0.9, lambda turn: world.tell(10.0 + 0.02 * turn, moved(push_posture, turn), slow))
     world.emergency.publish(Bool(data=True))
     until(lambda: world.shares[-1] == 0.0, lambda turn: world.tell(30.0 + 0.02 * turn, moved(push_posture, turn), slow))
-    until(lambda: len(world.shares) == len(world.base), lambda turn: None)
+    until(lambda: len(world.shares) >= len(world.base), lambda turn: None)  # more: a sign of life now and then
 
 
 @pytest.mark.parametrize("spin_with", [["-p", "body_controller_node:rate:=100"]], indirect=True)

@@ -13,6 +13,7 @@ from pbrl_control.body_jacobian import body_jacobian, body_velocity
 from pbrl_control.controller import BodyController
 from pbrl_control.errors import ControlError
 from pbrl_control.kinematics import Posture, RobotKinematics
+from pbrl_control.localizer import BaseLocalizer
 from pbrl_control.loop import ControlLoop, LoopCommand
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag
 from pbrl_control.push import GripperAnswer, GripperRequest, Phase, PushCommand, PushExecutive
@@ -28,7 +29,7 @@ LATER = {
     "pbrl_control.constraints.twist": ("achievable_twist",),
     "pbrl_control.constraints.wrench": ("expected_grip_wrench",),
     "pbrl_control.grasping": ("GraspCandidate", "sample_grasps"),
-    "pbrl_control.navigation": ("BaseLocalizer", "FloorMap", "MotionChecker", "PathTracker", "plan_route"),
+    "pbrl_control.navigation": ("FloorMap", "MotionChecker", "PathTracker", "plan_route"),
     "pbrl_control.trajectories.course": ("TrajectoryCourse",),
     "pbrl_control.trajectories.follower": ("TrajectoryFollower",),
     "pbrl_control.trajectories.trajectory": ("MotionLimits", "ObjectTrajectory", "Trajectory"),
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
     from pbrl_control.constraints.twist import achievable_twist
     from pbrl_control.constraints.wrench import expected_grip_wrench
     from pbrl_control.grasping import GraspCandidate, sample_grasps
-    from pbrl_control.navigation import BaseLocalizer, FloorMap, MotionChecker, PathTracker, plan_route
+    from pbrl_control.navigation import FloorMap, MotionChecker, PathTracker, plan_route
     from pbrl_control.trajectories.course import TrajectoryCourse
     from pbrl_control.trajectories.follower import TrajectoryFollower
     from pbrl_control.trajectories.trajectory import MotionLimits, ObjectTrajectory, Trajectory

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pbrl_control.errors import ControlError
 from pbrl_control.kinematics import ARM_JOINTS, BODY_JOINTS, SIDES, Posture, RobotKinematics
 from pbrl_control.limits import LONGEST
-from pbrl_control.navigation.localizer import BaseLocalizer
+from pbrl_control.localizer import BaseLocalizer
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag
 from pbrl_control.planar import Array, compose, inverse, placed, rotate_vector
 from pbrl_control.settings import FenceSettings

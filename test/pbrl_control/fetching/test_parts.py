@@ -18,7 +18,8 @@ from pbrl_control.fetching.whereabouts import Whereabouts
 from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.grasping import GraspSettings
 from pbrl_control.kinematics import RobotKinematics
-from pbrl_control.navigation import FloorMap, LocalizerSettings
+from pbrl_control.localizer import LocalizerSettings
+from pbrl_control.navigation import FloorMap
 from pbrl_control.navigation.floor_map import as_polygon
 from pbrl_control.percept import Grip, Percept, Tag
 from pbrl_control.planar import rotation

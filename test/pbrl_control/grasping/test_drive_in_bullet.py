@@ -14,7 +14,8 @@ from krang_sim import observations as seen
 from krang_sim.session import KrangSession
 from pbrl_control.grasping import GraspModel, sample_grasps
 from pbrl_control.kinematics import Posture, RobotKinematics
-from pbrl_control.navigation import KRANG_STOWED, BaseLocalizer, FloorMap, MotionChecker, PathTracker, TrackStatus
+from pbrl_control.localizer import BaseLocalizer
+from pbrl_control.navigation import KRANG_STOWED, FloorMap, MotionChecker, PathTracker, TrackStatus
 from pbrl_control.percept import BodyShape, Tag
 from pbrl_control.planar import yaw_of
 from pbrl_control.settings import BaseSettings, ControllerSettings

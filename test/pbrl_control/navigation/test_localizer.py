@@ -9,7 +9,7 @@ import pytest
 from floor_cases import wrapped
 
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
-from pbrl_control.navigation import BaseLocalizer, LocalizerSettings
+from pbrl_control.localizer import BaseLocalizer, LocalizerSettings
 from pbrl_control.percept import Tag
 from pbrl_control.planar import compose
 from pbrl_control.settings import ControllerSettings

@@ -7,7 +7,8 @@ from typing import Annotated
 from pydantic import Field
 
 from pbrl_control.grasping.settings import GraspSettings
-from pbrl_control.navigation.settings import LocalizerSettings, TrackerSettings
+from pbrl_control.localizer import LocalizerSettings
+from pbrl_control.navigation.settings import TrackerSettings
 from pbrl_control.settings import Finite, Positive, Section
 
 

@@ -8,8 +8,7 @@ from collections import deque
 import numpy as np
 
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
-from pbrl_control.navigation.localizer import BaseLocalizer
-from pbrl_control.navigation.settings import LocalizerSettings
+from pbrl_control.localizer import BaseLocalizer, LocalizerSettings
 from pbrl_control.percept import Percept, gripper_tag
 from pbrl_control.planar import Array, rotation
 

@@ -2,22 +2,19 @@
 
 from pbrl_control.navigation.floor_map import FloorMap
 from pbrl_control.navigation.footprint import KRANG_STOWED, Footprint, reaching_arms
-from pbrl_control.navigation.localizer import BaseLocalizer
 from pbrl_control.navigation.motion import MotionChecker
 from pbrl_control.navigation.path import BasePath, Leg
 from pbrl_control.navigation.route import RouteResult, plan_route
-from pbrl_control.navigation.settings import LocalizerSettings, TrackerSettings
+from pbrl_control.navigation.settings import TrackerSettings
 from pbrl_control.navigation.struck import Struck
 from pbrl_control.navigation.tracker import PathTracker, TrackCommand, TrackStatus
 
 __all__ = [
     "KRANG_STOWED",
-    "BaseLocalizer",
     "BasePath",
     "FloorMap",
     "Footprint",
     "Leg",
-    "LocalizerSettings",
     "MotionChecker",
     "PathTracker",
     "RouteResult",

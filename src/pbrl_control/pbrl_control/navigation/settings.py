@@ -1,4 +1,4 @@
-"""Gains, tolerances and patience of the path tracker and the localizer."""
+"""Gains, tolerances and patience of the path tracker."""
 
 from __future__ import annotations
 
@@ -27,13 +27,3 @@ class TrackerSettings(Section):
     budge: Positive = 0.003  # [m, rad] that counts as motion
     headway: Positive = 5.0  # [s] of driving or turning after which it is looked how far that has led
     got_on: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.25  # share of what was commanded that it has to have led
-
-
-class LocalizerSettings(Section):
-    """How odometry and gripper tags become a pose."""
-
-    smoothing: Positive = 0.8  # [s] over which one gripper's tags correct odometry; with both, half of it
-    odometry_age: Positive = 0.3  # [s] without odometry at which the pose is lost
-    tag_age: Positive = 1.0  # [s] without a tag of either gripper at which it is lost
-    jump: Positive = 0.3  # [m] off what is known at which a tag is not believed
-    jump_yaw: Positive = 0.5  # [rad]

@@ -14,12 +14,22 @@ from collections import deque
 import numpy as np
 
 from pbrl_control.kinematics import Posture, RobotKinematics
-from pbrl_control.navigation.settings import LocalizerSettings
 from pbrl_control.percept import Tag
 from pbrl_control.planar import Array, compose, inverse, rotate_vector, rotation, wrap
+from pbrl_control.settings import Positive, Section
 
 HISTORY = 2.0  # [s] of odometry that is kept for late tags
 LONGEST_PERIOD = 0.2  # [s] that one tag stands for at most, after a gap
+
+
+class LocalizerSettings(Section):
+    """How odometry and gripper tags become a pose."""
+
+    smoothing: Positive = 0.8  # [s] over which one gripper's tags correct odometry; with both, half of it
+    odometry_age: Positive = 0.3  # [s] without odometry at which the pose is lost
+    tag_age: Positive = 1.0  # [s] without a tag of either gripper at which it is lost
+    jump: Positive = 0.3  # [m] off what is known at which a tag is not believed
+    jump_yaw: Positive = 0.5  # [rad]
 
 
 class BaseLocalizer:
