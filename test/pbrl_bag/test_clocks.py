@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrl_bag.clocks import LEAST, clock_notes, clock_offsets
+from pbrl_bag.clocks import CAMERA, LEAST, clock_notes, clock_offsets
 
 
 def lags(offset: float, seed: int, count: int = 500) -> list[float]:
@@ -22,6 +22,16 @@ def test_an_offset_is_found_to_the_millisecond(offset: float) -> None:
     (note,) = clock_notes({"/wrench": lags(0.0, 1), "/pose": lags(offset, 2)})
     assert ("behind" if offset > 0 else "ahead of") in note
     assert f"clock_offset: {found['/pose']:g}" in note
+
+
+def test_what_a_camera_takes_is_no_clock() -> None:
+    late = lags(7.0 + CAMERA, 2)
+    assert clock_offsets({"/wrench": lags(0.0, 1), "/pose": late}, {"/pose"})["/pose"] == pytest.approx(7.0, abs=1e-3)
+    (wrench,) = clock_offsets({"/pose": late, "/wrench": lags(0.0, 1)}, {"/pose"}).items()
+    assert wrench == ("/wrench", pytest.approx(-7.0, abs=1e-3))
+    both = {"/wrench": lags(0.0, 1), "/pose": late, "/hand": late}
+    assert len(set(clock_offsets(both, {"/pose", "/hand"}).values())) == 1
+    assert clock_offsets({"/pose": late, "/hand": lags(7.0 + CAMERA, 3)}, {"/pose", "/hand"}) == {}
 
 
 def test_putting_it_right_leaves_nothing_to_say() -> None:

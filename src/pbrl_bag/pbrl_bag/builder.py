@@ -130,7 +130,8 @@ class RecordingBuilder:
             BagError: a topic is missing, a stream is malformed; the message names topic, time and field.
         """
         path = Path(path)
-        notes = self.notes + clock_notes(self._lags())
+        seen = {samples.label for (kind, _), samples in self._samples.items() if kind != "wrenches"}
+        notes = self.notes + clock_notes(self._lags(), seen)
         objects = self._poses("object_poses", notes)
         grippers = self._poses("gripper_poses", notes)
         wrenches = self._wrenches(notes)

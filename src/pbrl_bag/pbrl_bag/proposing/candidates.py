@@ -156,7 +156,8 @@ def _put_clocks_right(found: Candidates) -> None:
     streams.update({f"wrench {topic}": each for topic, each in found.wrenches.items()})
     streams.update({f"joints {topic}": each for topic, each in found.joints.items()})
     streams.update({f"pose {key}": each for key, each in found.poses.items()})
-    for name, offset in clock_offsets({name: each.lags for name, each in streams.items()}).items():
+    seen = {name for name, each in streams.items() if isinstance(each, PoseCandidate)}
+    for name, offset in clock_offsets({name: each.lags for name, each in streams.items()}, seen).items():
         stream = streams[name]
         stream.clock_offset = offset
         if not isinstance(stream, JointCandidate):

@@ -66,7 +66,7 @@ class Retold:
         lab: whose.
         storage: of the bag.
         right: whether table, hand and wrench are what they were in the native recording.
-        begins, ends: what the grasp that was found begins and ends later than the native one [s].
+        begins, ends: what the grasp that was found begins and ends later than the native one, by the poses' clock [s].
         apart: how far each mean is from that of the native recording over the same seconds, in its standard deviations,
             by parameter.
         as_told: the same from the native recording over the seconds that its own topic tells.
@@ -207,14 +207,16 @@ def judged(lab: str, path: Path, native: Recording, own: Posterior, seed: int) -
     mapping.write_text(completed(mapping_text(proposal, str(path), {bodies[0]: sides(geometry)}), geometry))
     recording = read_recording(path, mapping)
     right = same(recording, bodies[0], native)
-    if not recording.grasps:
+    if not (right and recording.grasps):
         return Retold(lab, STORAGES[lab], right, np.nan, np.nan, {}, {})
     grasp, told = recording.grasps[0], native.grasps[0]
     options = FitOptions(seed=seed)
     learned = fit_recording(recording, options).objects[bodies[0]].posterior
-    seconds = replace(told, start=grasp.start, end=grasp.end)
+    # A grasp is found in the poses: where their clock is put right to some 0.04 s only, it is as late as they.
+    late = float(np.median(recording.object_poses[bodies[0]].time - native.object_poses[own.object].time))
+    seconds = replace(told, start=grasp.start - late, end=grasp.end - late)
     there = fit_recording(replace(native, grasps=(seconds,)), options).objects[own.object].posterior
-    begins, ends = grasp.start - told.start, grasp.end - told.end
+    begins, ends = seconds.start - told.start, seconds.end - told.end
     return Retold(lab, STORAGES[lab], right, begins, ends, apart(learned, there), apart(learned, own))
 
 
