@@ -37,7 +37,7 @@ def track(concealed_recording: Callable[..., Recording]) -> Any:
 def peaked(made: Hypothesis, u: np.ndarray) -> Any:
     """Return what stands for a hypothesis fitted to coordinates (1, K), sure to one in a hundred."""
     peak = SimpleNamespace(coordinates=u, covariance=lambda row: 1e-4 * np.eye(u.shape[1]))
-    return SimpleNamespace(hypothesis=made, peak=peak, row=made.rows(u)[0])
+    return SimpleNamespace(hypothesis=made, peak=peak, row=made.rows(u)[0], draws=None)
 
 
 def hypothesis(track: Any, kind: str, *effects: str) -> Hypothesis:

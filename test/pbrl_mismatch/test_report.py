@@ -20,7 +20,7 @@ MIDDLE = np.array([0.3, -0.2])
 def fitted(columns: tuple[str, ...]) -> Any:
     """Return a stand-in for a fit with a posterior over some columns."""
     return SimpleNamespace(
-        hypothesis=SimpleNamespace(columns=columns), peak=SimpleNamespace(covariance=lambda row: COVARIANCE)
+        hypothesis=SimpleNamespace(columns=columns), peak=SimpleNamespace(covariance=lambda row: COVARIANCE), draws=None
     )
 
 
@@ -30,6 +30,15 @@ def test_the_ellipse_holds_the_middle_in_95_percent() -> None:
     assert found is not None
     draws = np.random.default_rng(0).multivariate_normal(MIDDLE, COVARIANCE[:2, :2], 20_000)
     assert np.mean(contains_xy(Polygon(found), *draws.T)) == pytest.approx(0.95, abs=0.01)
+
+
+def test_the_ellipse_is_that_of_the_draws_where_there_are_any() -> None:
+    made = fitted(("wheel2_x", "wheel2_y", "mass"))
+    by_laplace = place_uncertainty(made, EFFECTS["second_wheel"], disc("body", *MIDDLE, 0.05))
+    made.draws = np.random.default_rng(1).multivariate_normal(np.zeros(3), 9.0 * COVARIANCE, 20_000)
+    found = place_uncertainty(made, EFFECTS["second_wheel"], disc("body", *MIDDLE, 0.05))
+    assert found is not None and by_laplace is not None
+    assert Polygon(found).area == pytest.approx(9.0 * Polygon(by_laplace).area, rel=0.05)
 
 
 def test_a_place_that_is_not_free_has_none() -> None:

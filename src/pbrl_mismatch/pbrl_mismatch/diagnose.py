@@ -29,6 +29,7 @@ from pbrl_mismatch.search.grip import beside_motion, grip_evidence
 from pbrl_mismatch.search.heldout import noise_floor
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.library import IN_ANOTHER_CHANNEL
+from pbrl_mismatch.search.posterior import with_draws
 from pbrl_mismatch.search.predictive import Verdict, predictive_test
 from pbrl_mismatch.search.told_baseline import ToldBaseline, baseline_from_model
 from pbrl_mismatch.search.weigh import Weighed
@@ -230,7 +231,7 @@ def with_library(p_value: float, log_odds: float) -> float:
 def _diagnose_object(
     seed: np.random.SeedSequence, track: Track, grips: GripTrack | None, room: Array | None, options: DiagnoseOptions
 ) -> ObjectDiagnosis:
-    first, second, third = seed.spawn(3)
+    first, second, third, fourth = seed.spawn(4)
     told = told_baseline(track.object, options)
     if told is not None:
         options = options.model_copy(update={"without": (*options.without, *told.effects)})
@@ -246,6 +247,9 @@ def _diagnose_object(
     verdict = replace(verdict, p_value=with_library(p_value, explained.log_odds))
     mismatch = verdict.p_value < options.level
     weighed = held_against(explained, baseline, options) if mismatch else ()
+    if weighed and weighed[0].effects:
+        likeliest = with_draws(np.random.default_rng(fourth), weighed[0].fitted)
+        weighed = (replace(weighed[0], fitted=likeliest), *weighed[1:])
     scene, rng = scene_of(track, baseline.row), np.random.default_rng(third)
     found = findings_of(baseline, weighed, scene)
     residual = residual_wrench(track, baseline.row)

@@ -41,17 +41,20 @@ def saved_model(
     """Return a fitted hypothesis in the form of a model's file.
 
     Args:
-        rng: source of the draws, which are Gaussian in the coordinates of the fit.
+        rng: source of the draws: some of the fit's own, or Gaussian in its coordinates where it has none.
         fitted: baseline or hypothesis with effects.
         track: that it was fitted to.
         notes: what must not be read into it.
         draws: how many.
     """
     hypothesis, peak = fitted.hypothesis, fitted.peak
-    mean, covariance = peak.coordinates[0], peak.covariance(0)
-    values, vectors = np.linalg.eigh(covariance)
-    unit = rng.standard_normal((draws, len(mean)))
-    rows = hypothesis.rows(mean + (unit * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+    if fitted.draws is not None:
+        chosen = fitted.draws[rng.choice(len(fitted.draws), draws, replace=len(fitted.draws) < draws)]
+    else:
+        values, vectors = np.linalg.eigh(peak.covariance(0))
+        unit = rng.standard_normal((draws, len(values)))
+        chosen = peak.coordinates[0] + (unit * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    rows = hypothesis.rows(chosen)
     owners = {column: name for name in hypothesis.effects for column in _columns(name)}
     found: dict[str, dict[str, LearnedParameter]] = {name: {} for name in ("", *hypothesis.effects)}
     for parameter in hypothesis.parameters:

@@ -14,6 +14,7 @@ from scipy.stats import chi2
 from pbrl_mismatch.activity import activity
 from pbrl_mismatch.effects.effect import Effect, Scene, Where
 from pbrl_mismatch.effects.registry import EFFECTS
+from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.predictive import Verdict
 from pbrl_mismatch.search.weigh import Weighed
@@ -139,11 +140,10 @@ def _told(where: Where, uncertainty: Array | None) -> dict[str, Any]:
 def place_uncertainty(fitted: Fitted, effect: Effect, where: Where) -> Array | None:
     """Return the ellipse (n, 2) [m] that holds the middle of an effect's place with 95 %, or None if it is not free.
 
-    It is long where a recording shows only a line: that of a wheel which was never pushed along its axle, say. It is by
-    Laplace: where such a line bends, it is too short.
+    It is long where a recording shows only a line: that of a wheel which was never pushed along its axle, say.
 
     Args:
-        fitted: with the effect, its posterior by Laplace.
+        fitted: with the effect; its draws count, where it has them.
         effect: that has a place.
         where: that place.
     """
@@ -151,14 +151,30 @@ def place_uncertainty(fitted: Fitted, effect: Effect, where: Where) -> Array | N
     if effect.place is None or not set(effect.place) <= set(columns):
         return None
     chosen = [columns.index(column) for column in effect.place]
-    size, axes = np.linalg.eigh(fitted.peak.covariance(0)[np.ix_(chosen, chosen)])
+    covariance = fitted.peak.covariance(0) if fitted.draws is None else np.cov(fitted.draws.T)
+    size, axes = np.linalg.eigh(covariance[np.ix_(chosen, chosen)])
     angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE, endpoint=False)
     circle = np.sqrt(chi2.ppf(0.95, 2) * np.maximum(size, 0.0)) * np.stack([np.cos(angle), np.sin(angle)], -1)
     return np.asarray(where.shape.mean(axis=0) + circle @ axes.T, dtype=np.float64)
 
 
 def parameters_of(fitted: Fitted, columns: set[str] | None = None) -> dict[str, dict[str, Any]]:
-    """Return mean, standard deviation and unit of free columns; positive ones by the moments of a log-normal."""
+    """Return mean, standard deviation and unit of free columns.
+
+    They are those of the draws, where there are any; else of the peak's Gaussian, positive ones by the moments of a
+    log-normal.
+    """
+    if fitted.draws is not None:
+        rows = fitted.hypothesis.rows(fitted.draws)
+        return {
+            each.column: {
+                "mean": float(rows[:, COLUMN[each.column]].mean()),
+                "sd": float(rows[:, COLUMN[each.column]].std()),
+                "unit": each.unit,
+            }
+            for each in fitted.hypothesis.parameters
+            if columns is None or each.column in columns
+        }
     covariance = fitted.peak.covariance(0)
     out = {}
     for k, parameter in enumerate(fitted.hypothesis.parameters):

@@ -30,6 +30,7 @@ from pbrl_mismatch.next_experiment.candidates import Candidates, Reach, candidat
 from pbrl_mismatch.next_experiment.hand_kernel import CHANNELS, push_all
 from pbrl_mismatch.next_experiment.information import information_bounds
 from pbrl_mismatch.search.fitted import Fitted
+from pbrl_mismatch.search.posterior import Density
 from pbrl_mismatch.search.weigh import Weighed
 from pbrl_model.sensing.windows import LEAST_NOISE, POSE_RATE
 
@@ -246,28 +247,19 @@ def posterior_draws(rng: np.random.Generator, fitted: Fitted, moves: Array) -> A
     """Return (DRAWS, K) coordinates that the recording allows: Gaussian draws, weighed by it and drawn again.
 
     Where the recording says nothing of a parameter at the peak (a cord that was slack), the Gaussian is as wide as the
-    prior, although other values would have been noticed; their weight is small. Nuisances of the windows are integrated
-    out as they are linearised at the peak.
+    prior, although other values would have been noticed; their weight is small.
 
     Args:
         rng: of the draws.
-        fitted: the hypothesis.
+        fitted: the hypothesis; its own draws are taken where it has any.
         moves: (K, K) one standard deviation along each principal axis, in rows.
     """
-    peak, objective = fitted.peak, fitted.peak.objective
+    if fitted.draws is not None:
+        return fitted.draws[rng.choice(len(fitted.draws), DRAWS, replace=False)]
     normal = rng.standard_normal((TRIED, len(moves)))
     normal[0] = 0.0
-    points = peak.coordinates[0] + normal @ moves
-    nuisance = peak.nuisance[:1]
-    spread = objective.linearise(peak.coordinates[:1], nuisance).spread[0]
-    residual = objective.residual(points, np.repeat(nuisance, TRIED, axis=0))
-    centred = residual + np.einsum("wrk,wk->wr", spread, nuisance[0])
-    # The inverse of 1 + S S^T is 1 - S (1 + S^T S)^-1 S^T.
-    along = np.einsum("wrk,pwr->pwk", spread, centred)
-    inner = np.einsum("wrk,wrl->wkl", spread, spread) + np.eye(spread.shape[-1])
-    solved = np.linalg.solve(inner[None], along[..., None])[..., 0]
-    squares = np.sum(centred**2, axis=-1) - np.sum(along * solved, axis=-1)
-    value = -0.5 * squares @ peak.weight[0] - 0.5 * objective.prior_misfit(points) + 0.5 * np.sum(normal**2, axis=1)
+    points = fitted.peak.coordinates[0] + normal @ moves
+    value = Density(fitted.peak)(points) + 0.5 * np.sum(normal**2, axis=1)
     share = np.exp(value - value.max())
     edges = np.cumsum(share / share.sum())
     return points[np.minimum(np.searchsorted(edges, (np.arange(DRAWS) + rng.random()) / DRAWS), TRIED - 1)]

@@ -84,6 +84,7 @@ class Fitted:
         shorter: its best point alone over the next shorter windows; None: not kept.
         beside: log evidence of what the grippers' poses say beside the motion [nat].
         traced: its fit along the recorded path, over the longest windows; None: not made, or of other windows.
+        draws: (n, K) coordinates that the recording allows; None: not drawn, the peak's Gaussian stands for them.
     """
 
     hypothesis: Hypothesis
@@ -93,6 +94,7 @@ class Fitted:
     shorter: Peak | None = None
     beside: float = 0.0
     traced: Traced | None = None
+    draws: Array | None = None
 
     @property
     def row(self) -> Array:

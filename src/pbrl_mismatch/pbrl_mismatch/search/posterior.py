@@ -1,0 +1,95 @@
+"""Draws of what a recording allows a hypothesis: along ridges and past borders that a Gaussian at its peak knows not.
+
+When a load was put down may be all the same for a second, and a cord's anchor lie anywhere along it: there Laplace's
+deviations are those of the steepest place. Draws are by differential evolution (ter Braak 2006): each point of a
+population moves by the difference of two others, so that steps have the density's own shape. The population begins at
+Laplace's Gaussian, spreads in a flattened density, and is cooled.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.search.climb import Peak
+from pbrl_mismatch.search.fitted import Fitted
+from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
+
+Array = NDArray[np.float64]
+
+POPULATION, HOT, COOLING, KEPT = 48, 40, 60, 60
+"""Points, and generations: in the flattened density, while it is cooled, and of those that are kept."""
+FLAT = 0.3
+"""Power of the density that the population spreads in."""
+LEAP, JITTER = 0.1, 1e-3
+"""Share of moves by a whole difference, from mode to mode; noise of a move, in Laplace's deviations."""
+SHORTEST = 0.4
+"""The least that a difference is scaled by, over the best scale of a Gaussian."""
+
+
+class Density:
+    """Log density of a hypothesis's coordinates around one peak, each window's nuisances integrated out.
+
+    How the start and a steady wrench move the poses hardly depends on the coordinates: they are linearised once, at the
+    peak. Windows have their best scales, as in `search.objective`.
+    """
+
+    def __init__(self, peak: Peak) -> None:
+        """Linearise at the first point of a peak."""
+        self._objective, self._nuisance = peak.objective, peak.nuisance[:1]
+        self._spread = self._objective.linearise(peak.coordinates[:1], self._nuisance).spread[0]
+        inner = np.swapaxes(self._spread, -1, -2) @ self._spread
+        self._inverse = np.linalg.inv(inner + np.eye(inner.shape[-1]))
+
+    def __call__(self, points: Array) -> Array:
+        """Return (n,) the log density at points (n, K), up to a constant [nat]."""
+        residual = self._objective.residual(points, np.repeat(self._nuisance, len(points), axis=0))
+        centred = residual + np.einsum("wrk,wk->wr", self._spread, self._nuisance[0])
+        # The inverse of 1 + S S^T is 1 - S (1 + S^T S)^-1 S^T.
+        along = np.einsum("wrk,pwr->pwk", self._spread, centred)
+        squares = np.sum(centred**2, axis=-1) - np.einsum("pwk,wkl,pwl->pw", along, self._inverse, along)
+        return self._objective.likelihood(squares) - 0.5 * self._objective.prior_misfit(points)
+
+
+def with_draws(rng: np.random.Generator, fitted: Fitted) -> Fitted:
+    """Return a fitted hypothesis with draws of its coordinates.
+
+    What the grippers' poses say of a hold that gives way is a Gaussian of its own: such a hypothesis stays as it is.
+
+    Args:
+        rng: of the draws.
+        fitted: over simulated windows.
+    """
+    if GRASP_COMPLIANCE in fitted.hypothesis.effects:
+        return fitted
+    return replace(fitted, draws=evolved(rng, fitted.peak))
+
+
+def evolved(rng: np.random.Generator, peak: Peak) -> Array:
+    """Return draws (POPULATION * KEPT, K) of the density around the first point of a peak."""
+    density, hypothesis = Density(peak), peak.objective.hypothesis
+    size = len(hypothesis.spread)
+    values, vectors = np.linalg.eigh(peak.covariance(0))
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    jitter = JITTER * np.sqrt(np.sum(root**2, axis=1))
+    points = hypothesis.believable(peak.coordinates[0] + rng.standard_normal((POPULATION, size)) @ root.T)
+    here = density(points)
+    cooled = [*np.full(HOT, FLAT), *np.geomspace(FLAT, 1.0, COOLING), *np.ones(KEPT)]
+    kept = np.empty((len(cooled), POPULATION, size))
+    half = POPULATION // 2
+    for generation, power in enumerate(cooled):
+        for movers, others in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
+            first, second = points[others][rng.integers(0, half, (2, half))]
+            scale = 2.38 / math.sqrt(2.0 * size) * rng.uniform(SHORTEST, 1.0, half)
+            scale[rng.random(half) < LEAP] = 1.0
+            trial = points[movers] + scale[:, None] * (first - second) + jitter * rng.standard_normal((half, size))
+            allowed = np.all(hypothesis.believable(trial) == trial, axis=1)
+            there = density(trial)
+            taken = allowed & (np.log(rng.random(half)) < power * (there - here[movers]))
+            points[movers] = np.where(taken[:, None], trial, points[movers])
+            here[movers] = np.where(taken, there, here[movers])
+        kept[generation] = points
+    return kept[-KEPT:].reshape(-1, size)

@@ -1,0 +1,106 @@
+"""Draws of a hypothesis's coordinates: Laplace's where that is right, the prior's where nothing is seen, calibrated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch import EFFECTS, track_of
+from pbrl_mismatch.data.cuts import cut_windows
+from pbrl_mismatch.data.simulation import poses
+from pbrl_mismatch.search.climb import climb
+from pbrl_mismatch.search.fitted import Fitted, alone, scene_of
+from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
+from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
+from pbrl_mismatch.search.objective import NUISANCES, Objective
+from pbrl_mismatch.search.posterior import Density, evolved, with_draws
+
+FLOOR = 0.15
+
+
+@pytest.fixture(scope="module")
+def track(concealed_recording: Callable[..., Recording]) -> Any:
+    return track_of(concealed_recording("clean", 1), "table")
+
+
+@pytest.fixture(scope="module")
+def free() -> Any:
+    return baselines(BaselineOptions(20.0, 0.1, 0.1, 0.005), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+
+
+def told(rng: np.random.Generator, track: Any, hypothesis: Any, coordinates: np.ndarray) -> Objective:
+    """Return windows whose poses are drawn from the hypothesis."""
+    cuts = cut_windows(track, 2.0)
+    z = rng.standard_normal((1, len(cuts), NUISANCES))
+    starts = cuts.told + np.einsum("wkl,pwl->pwk", cuts.root, z[..., :6])
+    extra = z[..., None, 6:] * FLOOR * np.array([1.0, 1.0, cuts.track.gyration])
+    noise = rng.standard_normal(cuts.pose.shape) / np.where(cuts.weight > 0.0, cuts.weight, 1.0)
+    seen = poses(hypothesis.rows(coordinates), cuts, starts, extra)[0] + noise
+    return Objective(hypothesis, replace(cuts, pose=seen), FLOOR)
+
+
+def test_they_are_laplace_s_where_the_density_is_gaussian(track: Any, free: Any) -> None:
+    rng = np.random.default_rng(0)
+    peak = alone(climb(told(rng, track, free, free.mean[None]), free.mean[None], iterations=8))
+    draws, deviation = evolved(rng, peak), np.sqrt(np.diag(peak.covariance(0)))
+    assert np.all(np.abs(draws.mean(axis=0) - peak.coordinates[0]) < 0.3 * deviation)
+    assert draws.std(axis=0) == pytest.approx(deviation, rel=0.25)
+
+
+def test_the_density_is_what_the_climb_climbs(track: Any, free: Any) -> None:
+    rng = np.random.default_rng(1)
+    peak = alone(climb(told(rng, track, free, free.mean[None]), free.mean[None], iterations=8))
+    density, precision = Density(peak), np.linalg.inv(peak.covariance(0))
+    steps = 0.3 * rng.standard_normal((20, 3)) * np.sqrt(np.diag(peak.covariance(0)))
+    lost = density(peak.coordinates) - density(peak.coordinates + steps)
+    assert lost == pytest.approx(0.5 * np.einsum("nk,kl,nl->n", steps, precision, steps), rel=0.3, abs=0.02)
+
+
+def test_where_nothing_is_seen_they_are_the_prior_s(track: Any, free: Any) -> None:
+    scene = scene_of(track, free.rows(free.mean[None])[0])
+    laden = free.with_effect(EFFECTS["payload_change"], scene, 0)
+    at = laden.columns.index("payload_time")
+    laden = replace(
+        laden,
+        parameters=tuple(
+            replace(each, centre=-1e3, spread=10.0) if k == at else each for k, each in enumerate(laden.parameters)
+        ),
+    )
+    rng = np.random.default_rng(2)
+    peak = alone(climb(told(rng, track, laden, laden.mean[None]), laden.mean[None], iterations=6))
+    drawn = evolved(rng, peak)[:, at]
+    assert drawn.mean() == pytest.approx(-1e3, abs=4.0)
+    assert drawn.std() == pytest.approx(10.0, rel=0.35)
+
+
+def test_when_a_load_was_put_down_lies_where_they_say_as_often_as_they_say(track: Any, free: Any) -> None:
+    scene = scene_of(track, free.rows(free.mean[None])[0])
+    laden = free.with_effect(EFFECTS["payload_change"], scene, 0)
+    mass, at = (laden.columns.index(name) for name in ("payload_mass", "payload_time"))
+    within = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        truth = laden.mean.copy()
+        truth[mass] = np.log(0.15 * 20.0)
+        truth[at] += 0.3 * laden.spread[at] * rng.uniform(-1.0, 1.0)
+        peak = alone(climb(told(rng, track, laden, truth[None]), truth[None], iterations=6))
+        low, high = np.percentile(evolved(rng, peak)[:, at], [5.0, 95.0])
+        within += bool(low < truth[at] < high)
+    assert within >= 8
+
+
+def test_same_seed_same_bytes(track: Any, free: Any) -> None:
+    peak = alone(climb(told(np.random.default_rng(3), track, free, free.mean[None]), free.mean[None], iterations=4))
+    assert np.array_equal(evolved(np.random.default_rng(4), peak), evolved(np.random.default_rng(4), peak))
+
+
+def test_a_hold_that_gives_way_keeps_its_gaussian(track: Any, free: Any) -> None:
+    peak = alone(climb(told(np.random.default_rng(5), track, free, free.mean[None]), free.mean[None], iterations=2))
+    fitted = Fitted(replace(free, effects=(GRASP_COMPLIANCE,)), peak, None)
+    assert with_draws(np.random.default_rng(6), fitted) is fitted
+    assert with_draws(np.random.default_rng(6), replace(fitted, hypothesis=free)).draws is not None
