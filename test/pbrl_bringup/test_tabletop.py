@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -155,11 +156,13 @@ def test_rows_count_what_they_say() -> None:
     both = compared_rows(runs[:8], few, 0.3)
     assert [row.holds for row in both] == [False, True, True, True]
     assert both[1].value == pytest.approx(150 / 18)
-    searched = Searched(0.8, 0.3, 0.1, 0.2, 1.0, 0.5, (math.inf, 2.0, 1.0), math.inf, 0.1, 30)
+    searched = Searched(0.8, 0.3, 4.0, 0.2, 1.0, 0.5, (math.inf, 2.0, 1.0), math.inf, 0.1, 30)
     held = planning_rows([searched] * 3, [searched] * 3, Thesis(1399, 18.0, 33.0, 2.0))
-    assert [row.holds for row in held] == [True, True, True, False]
-    assert held[1].value == pytest.approx(0.1)
-    assert held[2].value == pytest.approx(30.0), "one that does not get there counts with the time it had"
+    assert [row.holds for row in held] == [True, True, True, True, False]
+    assert [row.value for row in held[1:4]] == pytest.approx([0.1, 4.0, 30.0]), "who gets nowhere counts with his time"
+    neither = replace(searched, seconds_with=math.inf, nearly=(math.inf, math.inf, 1.0))
+    unknown = planning_rows([neither] * 3, [], Thesis(1399, 18.0, 33.0, 2.0))
+    assert [row.holds for row in unknown] == [False, True, False], "two searches that get nowhere are not compared"
     compared = Compared(
         "a", "+x", 0.05, (0.05, 0, 0), (0.05, 0.001, 0.01), (True, True, False), (0.05, 0, 0.01), (0.05, 0.002, 0.01)
     )

@@ -7,6 +7,7 @@ laid but for a tenth, which the thesis's own figures end with.
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -201,18 +202,21 @@ def rows_of(found: Sequence[Searched], laid: Sequence[Searched], thesis: Thesis)
         ),
         at_least("gain of the descent: cost after as many layouts, median", gain, "1", 0.0),
         at_least(
-            "gain of the descent: time without it until the table is nearly laid, over time with it, medians",
-            min(times[0], PATIENCE) / times[1],
+            "gain of the descent: time without it over time with it to the same cost, median",
+            statistics.median(each.seconds_without / each.seconds_with for each in found),
             "1",
             1.0,
             thesis=round(thesis.seconds_without / thesis.seconds, 2),
-            seconds_with=times[1],
-            seconds_ours=times[2],
-            share_without=shares[0],
-            share_with=shares[1],
-            share_ours=shares[2],
+            nearly_laid_without=shares[0],
+            nearly_laid_with=shares[1],
+            nearly_laid_ours=shares[2],
+            seconds_until_nearly_laid_ours=times[2],
         ),
     ]
+    if math.isfinite(times[1]):  # else there are no two times to compare
+        gained = min(times[0], PATIENCE) / times[1]
+        what = "gain of the descent: time without it until the table is nearly laid, over time with it, medians"
+        rows.append(at_least(what, gained, "1", 1.0, seconds_without=times[0], seconds_with=times[1]))
     if laid:
         share = sum(each.laid <= PATIENCE for each in laid) / len(laid)
         seconds = statistics.median(each.laid for each in laid)
