@@ -1,0 +1,85 @@
+"""Somebody subscribes to everything and never reads: nobody else waits for him."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rosgraph_msgs.msg import Clock
+
+from pbrl_bringup.graph import free_domain, load_graph, running_graph, with_parameters
+from pbrl_bringup.processes import Programs
+
+READER = Path(__file__).parent / "reader_that_stops.py"
+TOPICS = 8
+"""So many topics it has heard from before it stops."""
+LASTS = 10.0
+"""[s] of the wall clock with a reader that has stopped, and as many before it."""
+RATE = 0.5
+
+
+class Watcher:
+    """When it heard of which simulated time."""
+
+    def __init__(self, context: Context, programs: Programs) -> None:
+        self.node = rclpy.create_node("watcher", context=context, enable_rosout=False)
+        self.heard: list[tuple[float, float]] = []
+        self._programs = programs
+        self._spinner = SingleThreadedExecutor(context=context)
+        self._spinner.add_node(self.node)
+        self.node.create_subscription(Clock, "/clock", self._on_clock, 10)
+
+    def _on_clock(self, message: Clock) -> None:
+        self.heard.append((time.monotonic(), message.clock.sec + 1e-9 * message.clock.nanosec))
+
+    def listen(self, seconds: float) -> tuple[float, float]:
+        """Listen for so long [s]; return how fast simulated time went, and the longest silence [s]."""
+        first, until = len(self.heard), time.monotonic() + seconds
+        while time.monotonic() < until:
+            self._spinner.spin_once(timeout_sec=0.1)
+            self._programs.check()
+        wall, simulated = np.array(self.heard[first:]).T
+        return float((simulated[-1] - simulated[0]) / (wall[-1] - wall[0])), float(np.diff(wall).max())
+
+    def until_heard(self) -> None:
+        """Wait for the first message."""
+        while not self.heard:
+            self._spinner.spin_once(timeout_sec=0.1)
+            self._programs.check()
+
+    def leave(self) -> None:
+        """Leave the graph."""
+        self._spinner.shutdown()
+        self.node.destroy_node()
+
+
+def test_nobody_waits_for_a_reader_that_has_stopped(tmp_path: Path, nothing_left: None) -> None:
+    graph = load_graph("namo")
+    graph = graph.model_copy(update={"nodes": {name: graph.nodes[name] for name in ("sim", "controller", "recorder")}})
+    graph = with_parameters(graph, {"sim.rate": str(RATE), "recorder.output": str(tmp_path / "bag")})
+    with free_domain() as domain, running_graph(graph, tmp_path / "logs", domain) as programs:
+        context = Context()
+        rclpy.init(context=context, domain_id=domain)
+        watcher = Watcher(context, programs)
+        watcher.until_heard()
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        command = [sys.executable, str(READER), str(TOPICS)]
+        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as reader:
+            try:
+                assert reader.stdout is not None
+                assert int(reader.stdout.readline()) >= TOPICS
+                os.waitpid(reader.pid, os.WUNTRACED)  # it has stopped
+                rate, silence = watcher.listen(LASTS)
+            finally:
+                reader.kill()
+        watcher.leave()
+        rclpy.try_shutdown(context=context)
+    assert rate > 0.8 * RATE, "the simulator does not wait for it"
+    assert silence < 1.0
