@@ -47,6 +47,8 @@ FREEDOM = 1.0
 WORTH_A_SET = 3.0
 """Where the likeliest explains all that the test against any wrench sees, one effect more is looked into where along
 the path it is worth by this more than its prior costs [nat]."""
+FAINT = 2.0
+"""What a law has that its limit has not begins so many deviations of its prior below the mean."""
 WORTH_A_KIND = 3.0
 """A kind of baseline with more parameters is worth a search of its own where it is better by this [nat]."""
 
@@ -191,6 +193,12 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
     own = fitted.peak.coordinates[0]
     crossed = _crossed(fitted.hypothesis, own, best.hypothesis, best.peak.coordinates[0])
     starts = [own, crossed]
+    if set(fitted.hypothesis.effects) != set(best.hypothesis.effects) and fitted.hypothesis.effects:
+        # Laws that are one another's limits share more than the body: ground friction is breakaway friction without.
+        alike = _crossed(fitted.hypothesis, own, best.hypothesis, best.peak.coordinates[0], all_shared=True)
+        own_alone = np.isin(fitted.hypothesis.columns, best.hypothesis.columns, invert=True)
+        faint = fitted.hypothesis.mean - FAINT * fitted.hypothesis.spread
+        starts += [alike, np.where(own_alone, faint, alike)] if np.any(alike != crossed) else []
     if fitted.hypothesis.effects:
         # What the best one bent of mass and delay may be the very thing that another effect explains.
         bent = np.isin(fitted.hypothesis.columns, list(BELIEVED))
@@ -202,15 +210,24 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
     found = replace(fitted, peak=alone(peak)) if better else fitted
     if found.traced is None or best.traced is None or not best.traced.evidence > found.traced.evidence:
         return found
-    along = _crossed(fitted.hypothesis, found.traced.coordinates, best.hypothesis, best.traced.coordinates)
-    other = traced(fitted.hypothesis, along[None], stages.fitted[-1], options.sensor_floor)
-    return replace(found, traced=other) if other.evidence > found.traced.evidence else found
+    reached = found.traced.coordinates, best.hypothesis, best.traced.coordinates
+    # Each has a path of its own.
+    for along in np.unique([_crossed(fitted.hypothesis, *reached, all_shared=each) for each in (False, True)], axis=0):
+        other = traced(fitted.hypothesis, along[None], stages.fitted[-1], options.sensor_floor)
+        if found.traced is None or other.evidence > found.traced.evidence:
+            found = replace(found, traced=other)
+    return found
 
 
-def _crossed(hypothesis: Hypothesis, own: Array, other: Hypothesis, coordinates: Array) -> Array:
-    """Return the coordinates (K,) of a hypothesis with what is the body's, or of effects of both, as another has it."""
+def _crossed(
+    hypothesis: Hypothesis, own: Array, other: Hypothesis, coordinates: Array, *, all_shared: bool = False
+) -> Array:
+    """Return the coordinates (K,) of a hypothesis with what is the body's, or of effects of both, as another has it.
+
+    With `all_shared` that is so of whatever both have, by its column, in whichever effect.
+    """
     crossed = own.copy()
-    not_shared = set(hypothesis.effects) - set(other.effects)
+    not_shared = set() if all_shared else set(hypothesis.effects) - set(other.effects)
     effect = {column for name in not_shared for v in EFFECTS[name].variants for column in v}
     for k, column in enumerate(hypothesis.columns):
         if column in other.columns and column not in effect:
