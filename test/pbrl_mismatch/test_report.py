@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from shapely import Polygon, contains_xy
 
-from pbrl_mismatch import EFFECTS
+from pbrl_mismatch import EFFECTS, report
 from pbrl_mismatch.effects.effect import disc
-from pbrl_mismatch.report import place_uncertainty
+from pbrl_mismatch.report import findings_of, place_uncertainty
+from pbrl_mismatch.search.weigh import Weighed
 
 COVARIANCE = np.array([[0.04, 0.018, 0.0], [0.018, 0.01, 0.0], [0.0, 0.0, 1.0]])
 MIDDLE = np.array([0.3, -0.2])
@@ -51,3 +52,14 @@ def test_every_place_s_middle_is_where_its_outline_is() -> None:
     placed = [effect for effect in EFFECTS.values() if effect.where is not None]
     assert placed and all(effect.place is not None for effect in placed)
     assert all(effect.place is None for effect in EFFECTS.values() if effect.where is None)
+
+
+def test_of_two_effects_the_one_that_explains_more_alone_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(report, "_described", lambda each, scene: each.effects)
+    peak = SimpleNamespace(settled=[True])
+    fits: Any = SimpleNamespace(usual_scale=1.0, peak=peak)
+    weights = {("hidden_obstacle", "unseen_body"): 0.0, ("unseen_body",): -9.0, ("hidden_obstacle",): -20.0, (): -50.0}
+    weighed = tuple(Weighed(names, fits, value, float(value == 0.0), False) for names, value in weights.items())
+    found = findings_of(fits, weighed, fits)
+    assert found.effects == ("unseen_body", "hidden_obstacle")
+    assert found.alternatives == ("unseen_body", "hidden_obstacle")

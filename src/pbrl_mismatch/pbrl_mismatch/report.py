@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -80,20 +80,21 @@ class Findings:
 
 
 def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene) -> Findings:
-    """Decide what is named.
+    """Decide what is named; of several effects together, the one that explains more alone comes first.
 
     Args:
         baseline: fitted.
         weighed: hypotheses, likeliest first; empty where nothing was searched.
         scene: what places are measured in.
     """
-    others = [each for each in weighed if each.effects]
+    alone = [each.effects[0] for each in weighed if len(each.effects) == 1]
+    others = [_weightiest_first(each, alone) for each in weighed if each.effects]
     if not others:
         return Findings((), (), ())
     best, notes = others[0], []
     scale, before = best.fitted.usual_scale, baseline.usual_scale
     reached = scale < EXPLAINED or (scale < NEAR and math.log(scale) < SHARE_LEFT * math.log(before))
-    named = best is weighed[0] and best.probability >= NAMED and reached and not best.vetoed
+    named = bool(weighed[0].effects) and best.probability >= NAMED and reached and not best.vetoed
     if not reached:
         notes.append(
             f"nothing in the library reaches the noise floor: the likeliest, {' and '.join(best.effects)}, "
@@ -108,6 +109,12 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene) ->
     rest = others[1:] if named else others
     alternatives = tuple(finding for each in rest[:SHOWN] for finding in _described(each, scene))
     return Findings(chosen, alternatives, tuple(notes))
+
+
+def _weightiest_first(weighed: Weighed, alone: list[str]) -> Weighed:
+    """Return a hypothesis with its effects in the order of `alone`: those that were tried alone, likeliest first."""
+    order = {name: rank for rank, name in enumerate(alone)}
+    return replace(weighed, effects=tuple(sorted(weighed.effects, key=lambda name: order.get(name, len(order)))))
 
 
 def _described(weighed: Weighed, scene: Scene) -> tuple[Finding, ...]:
