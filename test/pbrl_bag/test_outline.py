@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrl_bag.outline import LARGEST, fault_of_name, fault_of_outline
+from pbrl_bag.outline import LARGEST, MOST_CORNERS, fault_of_name, fault_of_outline
 
 SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
 ELL = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]
@@ -33,6 +33,15 @@ def test_an_outline_is_one_wherever_it_starts(outline: list[list[float]]) -> Non
 )
 def test_what_is_none_is_said(outline: list[list[float]], word: str) -> None:
     assert word in fault_of_outline(outline)
+
+
+def test_of_many_corners_each_edge_is_held_against_each_other() -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, MOST_CORNERS, endpoint=False)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    assert fault_of_outline(circle) == ""
+    assert "at most" in fault_of_outline(np.vstack([circle, [1.0, -1e-3]]))
+    circle[[700, 701]] = circle[[701, 700]]
+    assert fault_of_outline(circle) == ("expected an outline that does not cross itself, got edges 700 and 702 that do")
 
 
 @pytest.mark.parametrize("name", ["table", "table_a", "T2"])

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from pbrl_bag.types import Array
 
 LARGEST = 100.0  # [m] a corner further than this from the body's tag is a slip of unit or sign
+MOST_CORNERS = 1000  # every edge is held against every other
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
 
 
@@ -27,6 +28,8 @@ def fault_of_outline(corners: ArrayLike) -> str:
     points = np.asarray(corners, dtype=np.float64)
     if len(points) < 3:
         return f"expected at least 3 corners, got {len(points)}"
+    if len(points) > MOST_CORNERS:
+        return f"expected at most {MOST_CORNERS} corners, got {len(points)}"
     if not np.isfinite(points).all():
         return "expected finite numbers, got NaN or infinity"
     if np.abs(points).max() > LARGEST:
@@ -48,10 +51,10 @@ def _cross(a: Array, b: Array) -> Array:
 def _crossing(start: Array, end: Array) -> tuple[int, int] | None:
     """Return the first two edges, counted from 1, that cross properly; None where none do."""
     for i in range(len(start)):
-        for j in range(i + 1, len(start)):
-            one, other = end[i] - start[i], end[j] - start[j]
-            sides = _cross(one, start[j] - start[i]) * _cross(one, end[j] - start[i])
-            back = _cross(other, start[i] - start[j]) * _cross(other, end[i] - start[j])
-            if sides < 0.0 and back < 0.0:
-                return i + 1, j + 1
+        one, other, from_there = end[i] - start[i], end[i + 1 :] - start[i + 1 :], start[i] - start[i + 1 :]
+        sides = _cross(one, -from_there) * _cross(one, end[i + 1 :] - start[i])
+        back = _cross(other, from_there) * _cross(other, end[i] - start[i + 1 :])
+        found = np.flatnonzero((sides < 0.0) & (back < 0.0))
+        if len(found):
+            return i + 1, i + 2 + int(found[0])
     return None

@@ -139,6 +139,9 @@ def load_posterior(path: Path) -> Posterior:
         with import_module("h5py").File(path, "r") as file:  # h5netcdf complains on stderr where this cannot be done
             file.attrs.get("_nc3_strict")
         data = az().from_netcdf(str(path))
+        return from_inference_data(data)  # numbers are read from the file only now
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
     except (
         OSError,
         ValueError,
@@ -148,10 +151,6 @@ def load_posterior(path: Path) -> Posterior:
         RuntimeError,
     ) as error:  # HDF5 fails in any way
         raise ModelError(f"{path}: expected netCDF, got {' '.join(str(error).split())}") from None
-    try:
-        return from_inference_data(data)
-    except ModelError as error:
-        raise ModelError(f"{path}: {error}") from None
 
 
 def _number(value: float) -> float | None:

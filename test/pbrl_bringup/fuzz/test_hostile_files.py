@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -21,11 +22,13 @@ from pbrl_bringup.errors import BringupError
 from pbrl_bringup.fuzz.corpus import config, maps, png, posteriors, saved
 from pbrl_bringup.fuzz.push_seed import encoded, plain_mcap, push
 from pbrl_bringup.paths import node_executable
+from pbrl_bringup.view.models import told_model
 from pbrl_model.arviz_bridge import load_posterior
 from pbrl_model.errors import ModelError
 from pbrl_model.model_file import save_model
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.lattice.ros_map import read_map
+from pbrl_planner.tabletop.knowledge import Knowledge
 from pr2_cart_sim.maps import load_map
 from tabletop_sim.scene import load_desk
 
@@ -125,6 +128,32 @@ def test_posteriors_damaged_anywhere_are_refused(tmp_path: Path) -> None:
             load_posterior(path)
         except ModelError as error:
             assert str(path) in str(error)
+
+
+def test_a_posterior_whose_numbers_cannot_be_unpacked_is_refused(tmp_path: Path) -> None:
+    """A damaged chunk shows when numbers are read, after the file was opened."""
+    whole = posteriors()[0]["posterior_table.nc"]
+    path, said = tmp_path / "x.nc", ""
+    for at in range(4000, len(whole), 499):
+        path.write_bytes(whole[:at] + bytes(64 * [255]) + whole[at + 64 :])
+        try:
+            load_posterior(path)
+        except ModelError as error:
+            said += str(error)
+    assert "filter returned failure" in said
+
+
+def test_draws_that_cannot_be_rounded_are_told_and_not_drawn() -> None:
+    draws = {name: np.full(10, 1e306) for name in ("wheel_x", "wheel_y", "wheel_theta")}
+    told = told_model("caster", [("wheel_x", 1e306, 0.0, "m")], draws)
+    assert told["wheel"] is None and "wheel_x 1e+306" in told["told"]
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"eraser": [{"count": 1, "mean": [1' + "0" * 400 + "]}]}"])
+def test_pushes_learned_of_no_sense_are_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / "tables.json").write_text(text)
+    with pytest.raises(PlannerError, match=r"tables\.json"):
+        Knowledge("tables", (0.05,), file=tmp_path / "tables.json")
 
 
 def test_a_text_that_netcdf_cannot_hold_is_told(tmp_path: Path) -> None:

@@ -8,13 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rclpy
 from geometry_msgs.msg import Point, Pose, PoseStamped, WrenchStamped
-from pbrl_msgs.msg import Scene
+from nav_msgs.msg import MapMetaData, OccupancyGrid
+from pbrl_msgs.msg import Mismatch, MismatchEffect, Mismatches, Scene
+from rclpy.context import Context
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 
 from pbrl_bag import BagError
 from pbrl_bringup.fuzz.push_seed import models, push
+from pbrl_bringup.graph import free_domain
 from pbrl_bringup.view.live import LiveGraph
 from pbrl_control.errors import ControlError
 from pbrl_control.kinematics import ARM_JOINTS, BODY_JOINTS
@@ -26,6 +31,7 @@ from pbrl_namo.ros.conversions import goal_from_pose
 from pbrl_planner.cart.tracker import CartTracker
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.ros.conversions import planar_pose
+from pbrl_planner.ros.costmap_node import CostmapNode
 
 HOSTILE = [math.nan, math.inf, 1e308, -1e200]
 
@@ -99,6 +105,30 @@ def test_a_cart_that_cannot_be_is_not_taken_for_the_last_one() -> None:
     with pytest.raises(PlannerError):
         tracker.furniture({"cart": np.array([[0.0, 0.0], [1e9, 0.0], [1e9, 1.0]])})
     assert tracker.cart is None
+
+
+def test_the_viewer_leaves_out_a_finding_that_is_none() -> None:
+    graph, told = LiveGraph("x"), Mismatches()
+    for name, probability in (("crate", math.nan), ("table_a", 0.5)):
+        told.mismatches.append(Mismatch(object=name, effects=[MismatchEffect(effect="x", probability=probability)]))
+    graph.hear("/mismatches", told)
+    data = graph.data()
+    assert any("'crate' is no finding" in note for note in data["notes"])
+    json.dumps(data, allow_nan=False)
+
+
+def test_the_costmap_outlives_a_cart_that_is_told_to_be_nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Corners so far away that the outline has no area any more."""
+    with free_domain() as domain:
+        context = Context()
+        rclpy.init(context=context, domain_id=domain)
+        node = CostmapNode(context=context)
+        node._on_map(OccupancyGrid(info=MapMetaData(resolution=0.1, width=3, height=3), data=[0] * 9))
+        monkeypatch.setattr(node.tracker, "own", lambda now: [np.array([[1e17, 0.0], [1e17 + 1, 0.0], [1e17, 1.0]])])
+        node._tell_global()
+        assert not node._clear(Trigger.Request(), Trigger.Response()).success
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
 
 
 @pytest.mark.parametrize("quaternion", [(0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0), (1e308, 1e308, 0.0, 1.0)])

@@ -19,6 +19,8 @@ _ARRAY = re.compile(r"(?P<of>[^\[\]]+)\[(?P<count>\d+)\]")
 _WHOLE = re.compile(r"(?P<sign>u?)int(?P<bits>8|16|32|64)|octet|byte|char")
 LENGTHS = (0, 1, 2, 3, 5, 100, 20_000)
 """Of sequences."""
+LARGEST = 1_000_000
+"""Letters of all texts of one: more of them no middleware carries."""
 
 
 def mutate_message(message: Any, rng: np.random.Generator) -> Any:
@@ -61,8 +63,10 @@ def _many(sequence: Any, fixed: Any, value: Any, rng: np.random.Generator) -> An
     draw = rng.random()
     if fixed is None and draw < 0.5:
         length = int(rng.choice(LENGTHS))
-        fresh = values[:length] + [_one(kind, None, rng)] * min(length - len(values[:length]), 20_000)
-        values = fresh if "/" not in kind else fresh[:300]
+        added = _one(kind, None, rng)
+        fresh = values[:length] + [added] * (length - len(values[:length]))
+        values = fresh[: LARGEST // len(added) if isinstance(added, str) and added else None]
+        values = values if "/" not in kind else values[:300]
     elif fixed is None and draw < 0.6 and values:
         values = values[::-1] + values
     elif values:

@@ -14,6 +14,8 @@ from pbrl_bringup.fuzz.byte_mutations import mutate_bytes, mutate_text, written
 from pbrl_bringup.fuzz.hostile import JSON_BOMBS, NOTHINGS, NUMBERS, TEXTS, YAML_BOMBS
 
 DEEP, LONG = 60, 3000
+LARGEST = 50_000
+"""Nodes of a tree that is still mutated, or written: what is many times longer is what byte mutations are for."""
 
 
 def mutate_yaml(data: bytes, rng: np.random.Generator, others: Sequence[bytes]) -> bytes:
@@ -47,8 +49,24 @@ def _mutate(
         return bomb if rng.random() < 0.5 else data + b"\n" + bomb
     tree = parse(data)
     for _ in range(1 + int(rng.geometric(0.5))):
-        tree = mutate_tree(tree, rng)
+        mutated = mutate_tree(tree, rng)
+        if _is_large(mutated):
+            break
+        tree = mutated
     return text(tree).encode("utf-8", "replace")
+
+
+def _is_large(tree: Any) -> bool:
+    """Tell whether plain data has more than `LARGEST` nodes, without counting on."""
+    waiting, count = [tree], 0
+    while waiting:
+        node = waiting.pop()
+        count += 1
+        if isinstance(node, dict | list):
+            waiting.extend(node.values() if isinstance(node, dict) else node)
+        if count + len(waiting) > LARGEST:
+            return True
+    return False
 
 
 def mutate_tree(tree: Any, rng: np.random.Generator) -> Any:

@@ -174,7 +174,10 @@ class ListenerSubject:
         for topic, _, message, _ in self._known[start : start + 8]:
             draw = rng.random()
             mutated = mutate_message(message, rng) if draw < 0.5 else message
-            data = bytearray(serialize_message(mutated))
+            try:
+                data = bytearray(serialize_message(mutated))
+            except RuntimeError:  # nobody could have sent that
+                data = bytearray(serialize_message(message))
             if draw > 0.9:
                 for _ in range(3):
                     data[rng.integers(4, len(data))] ^= 1 << int(rng.integers(8))

@@ -117,7 +117,12 @@ class Extras:
 
     def _mismatches(self, message: Any) -> None:
         self.version += 1
-        self.found = {str(each.object): _found(each) for each in message.mismatches}
+        self.found = {}
+        for each in message.mismatches:
+            try:
+                self.found[str(each.object)] = _found(each)
+            except ValidationError:
+                self._note(f"/mismatches: what is told of {each.object!r} is no finding: not drawn")
 
     def _note(self, text: str) -> None:
         if text not in self.notes:

@@ -12,6 +12,8 @@ from pbrl_bringup.clouds import hinge_of, wheel_of
 
 Array = NDArray[np.float64]
 
+FARTHEST = 1e9
+"""Places further away than this [m] are nobody's, and cannot be rounded: they are told and not drawn."""
 DOTS = 150
 """Draws that are drawn of each object: a page of five objects still slides at thirty pictures a second."""
 
@@ -29,9 +31,9 @@ def told_model(
     listed = [f"{name} {m:.3g} ± {s:.2g}{'' if unit == '1' else ' ' + unit}" for name, m, s, unit in numbers]
     count = min((len(each) for each in draws.values()), default=0)
     shown = np.unique(np.linspace(0, max(count - 1, 0), DOTS).astype(np.intp))
-    several = count > 1
-    wheel = wheel_of(draws, shown) if several and {"wheel_x", "wheel_y"} <= set(draws) else None
-    hinge = hinge_of(draws, shown) if several and {"hinge_x", "hinge_y", "hinge_radius"} <= set(draws) else None
+    places = {name: each for name, each in draws.items() if count > 1 and (np.abs(each) < FARTHEST).all()}
+    wheel = wheel_of(places, shown) if {"wheel_x", "wheel_y"} <= set(places) else None
+    hinge = hinge_of(places, shown) if {"hinge_x", "hinge_y", "hinge_radius"} <= set(places) else None
     return {
         "told": f"{kind}: {', '.join(listed)}",
         "wheel": None if wheel is None else wheel.model_dump(),

@@ -106,14 +106,24 @@ class CostmapNode(Node):
             return
         # Where scans cease, nothing is forgotten: nobody has looked.
         now = self._global.time if math.isfinite(self._global.time) else self._now()
-        self._global_out.publish(field_to_msg(self._field(self._global, now, self.tracker.own(now))))
+        try:
+            field = self._field(self._global, now, self.tracker.own(now))
+        except PlannerError as error:  # the robot or the cart is told to be where nobody can be
+            self._left_aside = f"the global costmap was not told: {error}"
+            self.get_logger().warning(self._left_aside, throttle_duration_sec=SAID)
+            return
+        self._global_out.publish(field_to_msg(field))
 
     def _field(self, costs: Costmap, now: float, own: list[Array]) -> CostField:
         return with_shoulders(costs.field(now), self._static, own)
 
     def _clear(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         own = self.tracker.own(self._now())
-        steps = [step for each in self._maps() for step in (each.clear_inside(own), each.clear_unconfirmed())]
+        try:
+            steps = [step for each in self._maps() for step in (each.clear_inside(own), each.clear_unconfirmed())]
+        except PlannerError as error:
+            response.success, response.message = False, str(error)
+            return response
         return self._told(steps, response)
 
     def _forget_unseen(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -211,7 +211,7 @@ class LearnedDisplacements:
                     variance = row["variance"]
                     each._squares = np.zeros(3) if variance is None else np.array(variance, float) * (each.count - 1)
                     push = Push(str(row["primitive"]), float(str(row["travel"])))
-                except (KeyError, TypeError, ValueError) as error:
+                except (KeyError, TypeError, ValueError, OverflowError) as error:
                     raise PlannerError(
                         f"model of {name!r}: expected primitive, travel, count, mean and variance, "
                         f"got {dict(row)}: {error}"

@@ -113,7 +113,7 @@ class Knowledge:
             if self._kind == "physics":
                 return PhysicsDisplacements.from_dict(data, self._effector, seed=self._seed)
             return LearnedDisplacements.from_dict(data)
-        except (OSError, ValueError, AttributeError, TypeError, PlannerError) as error:
+        except (OSError, ValueError, AttributeError, TypeError, OverflowError, RecursionError, PlannerError) as error:
             raise PlannerError(
                 f"model: expected a JSON file of displacement models ({self._kind}), got {file}: {error}"
             ) from error

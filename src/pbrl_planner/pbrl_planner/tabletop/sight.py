@@ -22,6 +22,8 @@ from pbrl_planner.tabletop.desk import Item, Table
 
 Image = NDArray[np.uint8]
 
+FARTHEST = 1e6
+"""A corner further from the picture than this [px] is that of a camera which cannot be."""
 DARK = 0.75
 """Of the table's brightness: what is darker belongs to an item."""
 SMALLEST = 1e-4
@@ -131,8 +133,7 @@ class ItemFinder:
         """Return where the table is dark, and no obstacle is known to be."""
         low, high = self.table.low, self.table.high
         corners = np.array([[low[0], low[1], 0.0], [high[0], low[1], 0.0], [*high, 0.0], [low[0], high[1], 0.0]])
-        top = np.zeros(image.shape, np.uint8)
-        cv2.fillConvexPoly(top, np.rint(camera.project(corners)).astype(np.int32), (1,))
+        top = _filled(image.shape, camera.project(corners))
         if not top.any():
             return top
         bright = float(np.percentile(image[top > 0], 90))
@@ -218,8 +219,14 @@ def _cut_out(dark: Image, pose: Array, tall: TallItem, camera: CameraCalibration
 
 def _painted(shape: tuple[int, ...], pose: Array, tall: TallItem, camera: CameraCalibration) -> Image:
     """Return a picture in which an item at a pose (3,) is 1."""
+    return _filled(shape, _silhouette(pose, tall, camera))
+
+
+def _filled(shape: tuple[int, ...], corners: Array) -> Image:
+    """Return a picture in which a convex polygon (k, 2) [px] is 1; nothing is, where it lies beyond all pictures."""
     picture = np.zeros(shape, np.uint8)
-    cv2.fillConvexPoly(picture, np.rint(_silhouette(pose, tall, camera)).astype(np.int32), (1,))
+    if (np.abs(corners) < FARTHEST).all():  # it is drawn row by row, and further away rows are counted in thousands
+        cv2.fillConvexPoly(picture, np.rint(corners).astype(np.int32), (1,))
     return picture
 
 
