@@ -17,7 +17,7 @@ from pbrl_bringup.errors import BringupError
 from pbrl_bringup.fuzz.byte_mutations import mutate_bytes, mutate_text
 from pbrl_bringup.fuzz.campaign import Finding, Tally, shares_of
 from pbrl_bringup.fuzz.message_mutations import mutate_message
-from pbrl_bringup.fuzz.push_seed import push
+from pbrl_bringup.fuzz.push_seed import models, push
 from pbrl_bringup.fuzz.readers import READERS
 from pbrl_bringup.fuzz.subjects import FILES, subject
 from pbrl_bringup.fuzz.text_mutations import mutate_table, mutate_xml
@@ -126,6 +126,12 @@ def test_messages_are_mutated_into_what_the_wire_can_carry() -> None:
             made = mutate_message(message, rng)
             deserialize_message(serialize_message(made), type(made))
         assert str(message) == before
+
+
+def test_a_mutated_message_is_one_that_a_middleware_could_carry() -> None:
+    """Texts thousands of times, models with thousands of draws hundreds of times: gigabytes are nobody's input."""
+    rng = np.random.default_rng(0)
+    assert max(len(serialize_message(mutate_message(models(), rng))) for _ in range(400)) < 50_000_000
 
 
 def test_every_reader_has_a_share_and_inputs_add_up() -> None:

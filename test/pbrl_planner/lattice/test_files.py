@@ -167,6 +167,7 @@ def read_environment_of(text: str) -> Environment:
         ("cells): 3 2", "cells): 8000 8000", r"line 12: expected 64000000 costs .* the end of the file after 6"),
         ("cells): 3 2", "cells): 2 2", r"line 12: expected 4 costs \(2 x 2\), got 6 or more"),
         ("cells): 3 2", "cells): 0 2", r"line 1: expected discretization"),
+        ("cellsize(meters): 0.5", "cellsize(meters): 1e-320", r"map: expected a resolution of 1e-06 m at least"),
         ("obsthresh: 254", "obsthresh: 256", r"line 2: expected obsthresh"),
         ("cost_inscribed_thresh: 253\n", "", r"line 3: expected cost_inscribed_thresh:, got"),
         (

@@ -65,8 +65,7 @@ def _many(sequence: Any, fixed: Any, value: Any, rng: np.random.Generator) -> An
         length = int(rng.choice(LENGTHS))
         added = _one(kind, None, rng)
         fresh = values[:length] + [added] * (length - len(values[:length]))
-        values = fresh[: LARGEST // len(added) if isinstance(added, str) and added else None]
-        values = values if "/" not in kind else values[:300]
+        values = fresh[: _most(kind, added)]
     elif fixed is None and draw < 0.6 and values:
         values = values[::-1] + values
     elif values:
@@ -75,6 +74,13 @@ def _many(sequence: Any, fixed: Any, value: Any, rng: np.random.Generator) -> An
     if isinstance(value, array.array):
         return array.array(value.typecode, values)
     return np.array(values, dtype=value.dtype) if isinstance(value, np.ndarray) else values
+
+
+def _most(kind: str, added: Any) -> int | None:
+    """Return how many of a text or message a sequence may hold: what is long itself is not there thousands of times."""
+    if isinstance(added, str):
+        return LARGEST // max(len(added), 1)
+    return min(300, LARGEST // len(repr(added)) + 2) if "/" in kind else None
 
 
 def _one(kind: str, value: Any, rng: np.random.Generator) -> Any:

@@ -76,7 +76,11 @@ def parse_environment(tokens: Tokens) -> Environment:
         x, y, theta = (tokens.number(f"{name}(meters,rads) {what}", -1e6, 1e6) for what in ("x", "y", "theta"))
         poses.append((x, y, theta))
     tokens.key("environment")
-    grid = CostGrid(_cells(tokens, rows, columns), resolution, blocked=min(inscribed, lethal), lethal=lethal)
+    cells = _cells(tokens, rows, columns)
+    try:
+        grid = CostGrid(cells, resolution, blocked=min(inscribed, lethal), lethal=lethal)
+    except PlannerError as error:
+        raise PlannerError(f"{tokens.name}: {error}") from None
     pace = Pace(speed=speed, yaw_rate=EIGHTH / eighth, articulation_rate=EIGHTH / eighth)
     for name, (x, y, _) in zip(("start", "end"), poses, strict=True):
         column, row = grid.cell_of(x, y)

@@ -15,6 +15,8 @@ from pbrl_control.navigation.floor_map import FloorMap
 from pbrl_planner.errors import PlannerError
 
 MOST_CELLS = 64_000_000
+FINEST = 1e-6
+"""Side of a cell at least [m]: places are counted in cells."""
 LETHAL = 254
 """Cost of a cell with something in it, as in ROS and SBPL."""
 DEAREST = 252
@@ -48,8 +50,8 @@ class CostGrid:
             raise PlannerError(
                 f"map: expected (rows, columns) of uint8, at most {MOST_CELLS} cells, got {cells.dtype} {cells.shape}"
             )
-        if not (math.isfinite(self.resolution) and self.resolution > 0.0):
-            raise PlannerError(f"map: expected a resolution above zero, got {self.resolution}")
+        if not FINEST <= self.resolution < math.inf:
+            raise PlannerError(f"map: expected a resolution of {FINEST:g} m at least, got {self.resolution} m")
         if not (len(self.origin) == 2 and np.isfinite(self.origin).all()):
             raise PlannerError(f"map: expected a finite origin (x, y), got {self.origin}")
         if not 1 <= self.blocked <= 255 or not 1 <= self.lethal <= 255:
