@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-MOST_LETTERS = 300_000
+MOST_LETTERS = 200_000
 """Of a document that is read at all: some seconds' work."""
 MOST_VALUES = 100_000
 """Of a document, each counted as often as it stands there: a line of aliases can stand for a billion."""

@@ -176,6 +176,7 @@ def read_environment_of(text: str) -> Environment:
             r"line 5: expected cellsize\(meters\): a finite number above 0",
         ),
         ("secs): 2.0", "secs): 0", r"line 7: expected timetoturn45degsinplace"),
+        ("secs): 2.0", "secs): 1e-320", r"line 7: expected timetoturn45degsinplace\(secs\): 1e-06 s at least"),
         ("end(meters,rads): 1.2", "end(meters,rads): 1.6", r"expected end\(meters,rads\) on the map of 1.5 x 1 m"),
         ("start(meters,rads): 0.1", "start(meters,rads): -0.1", r"expected start\(meters,rads\) on the map"),
         ("3 4 254", "3 4 256", r"line 12: expected a cost from 0 to 255, got '256'"),

@@ -14,6 +14,7 @@ from pbrl_planner.lattice.primitives import Pace
 from pbrl_planner.lattice.tokens import Tokens
 
 EIGHTH = 3.141592653589793 / 4.0  # of a turn [rad]
+QUICKEST = 1e-6  # [s] for an eighth of a turn: faster is no number of turns a second
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,8 @@ def parse_environment(tokens: Tokens) -> Environment:
     speed = tokens.number("nominalvel(mpersecs)", 0.0, 1e3)
     tokens.key("timetoturn45degsinplace(secs)")
     eighth = tokens.number("timetoturn45degsinplace(secs)", 0.0, 1e6)
+    if eighth < QUICKEST:
+        raise tokens.refuse(f"timetoturn45degsinplace(secs): {QUICKEST:g} s at least", f"{eighth:g}")
     poses = []
     for name in ("start", "end"):
         tokens.key(f"{name}(meters,rads)")
