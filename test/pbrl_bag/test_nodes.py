@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -79,14 +79,12 @@ def graph() -> Iterator[Graph]:
 MOST = 3_000_000  # [bytes] of a file that the recorder may write; its middleware wants some, too
 
 
-def test_a_recorder_whose_disk_is_full_says_so_in_a_line_and_keeps_what_it_has(graph: Graph, tmp_path: Path) -> None:
+def test_a_recorder_whose_disk_is_full_says_so_in_a_line_and_keeps_what_it_has(
+    graph: Graph, tmp_path: Path, little_room: Callable[[int], AbstractContextManager[None]]
+) -> None:
     noise = np.random.default_rng(0).integers(0, 256, 100_000, dtype=np.uint8)  # does not pack
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (MOST, before[1]))  # a child has it from us
-    try:
+    with little_room(MOST):
         recorder = graph.start("recorder_node", output=str(tmp_path / "bag"), topics="[/noise]")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     publisher = graph.node.create_publisher(UInt8MultiArray, "/noise", 10)
     graph.until(lambda: publisher.get_subscription_count() > 0)
 

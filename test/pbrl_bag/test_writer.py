@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import filecmp
-import resource
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -170,19 +169,10 @@ def test_qos_given_for_a_topic_is_kept(tmp_path: Path) -> None:
     assert list(topic.qos) == offered
 
 
-@contextmanager
-def little_room(most: int) -> Iterator[None]:
-    """Let no file of this process grow beyond so many bytes."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
 @pytest.mark.parametrize("flushed", [True, False])
-def test_a_bag_on_a_full_disk_keeps_what_it_has_and_says_the_same_ever_after(tmp_path: Path, flushed: bool) -> None:
+def test_a_bag_on_a_full_disk_keeps_what_it_has_and_says_the_same_ever_after(
+    tmp_path: Path, little_room: Callable[[int], AbstractContextManager[None]], flushed: bool
+) -> None:
     noise = np.random.default_rng(0)
     bag = BagWriter(tmp_path / "bag", live=False)
     with little_room(200_000), pytest.raises(BagError, match="cannot write: File too large; the") as caught:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import rclpy
@@ -23,23 +22,14 @@ MOST = 800_000  # [bytes] of a file; the simulator keeps none, and the middlewar
 LONGER = 3.0  # [s] of simulated time after the recorder's end
 
 
-@contextmanager
-def small_files() -> Iterator[None]:
-    """Let what is started write short files only; a child has the limit from us."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (MOST, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
-def test_the_graph_goes_on_without_its_recorder(tmp_path: Path, nothing_left: None) -> None:
+def test_the_graph_goes_on_without_its_recorder(
+    tmp_path: Path, nothing_left: None, little_room: Callable[[int], AbstractContextManager[None]]
+) -> None:
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     settings = ["--set", f"recorder.output={tmp_path / 'bag'}", "--set", "sim.rate=0.5", "--with", "recorder"]
     with free_domain() as domain:
         command = [sys.executable, "-m", "pbrl_bringup", "run", "namo", *settings, "--domain", str(domain)]
-        with small_files():
+        with little_room(MOST):
             graph = subprocess.Popen(
                 command, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
             )

@@ -42,7 +42,6 @@ _UNREADABLE = (
     AssertionError,
     TypeError,
     AttributeError,
-    NotImplementedError,
     ArithmeticError,
     MemoryError,
 )

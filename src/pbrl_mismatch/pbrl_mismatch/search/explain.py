@@ -190,22 +190,8 @@ def _polished(
 
 def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseOptions) -> Fitted:
     """Return a hypothesis climbed on from where it is, and from where another has the body's own parameters."""
-    own = fitted.peak.coordinates[0]
-    crossed = _crossed(fitted.hypothesis, own, best.hypothesis, best.peak.coordinates[0])
-    starts = [own, crossed]
-    if set(fitted.hypothesis.effects) != set(best.hypothesis.effects) and fitted.hypothesis.effects:
-        # Laws that are one another's limits share more than the body: ground friction is breakaway friction without.
-        alike = _crossed(fitted.hypothesis, own, best.hypothesis, best.peak.coordinates[0], all_shared=True)
-        own_alone = np.isin(fitted.hypothesis.columns, best.hypothesis.columns, invert=True)
-        faint = fitted.hypothesis.mean - FAINT * fitted.hypothesis.spread
-        starts += [alike, np.where(own_alone, faint, alike)] if np.any(alike != crossed) else []
-    if fitted.hypothesis.effects:
-        # What the best one bent of mass and delay may be the very thing that another effect explains.
-        bent = np.isin(fitted.hypothesis.columns, list(BELIEVED))
-        starts += [_afresh(fitted.hypothesis, own), np.where(bent, own, crossed)]
-    starts += [fitted.traced.coordinates] if fitted.traced is not None else []
     objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
-    peak = climb(objective, np.array(starts), iterations=LONGER * options.iterations[-1])
+    peak = climb(objective, _starts(fitted, best), iterations=LONGER * options.iterations[-1])
     better = float(peak.evidence.max()) > float(fitted.peak.evidence[0])
     found = replace(fitted, peak=alone(peak)) if better else fitted
     if found.traced is None or best.traced is None or not best.traced.evidence > found.traced.evidence:
@@ -217,6 +203,23 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
         if found.traced is None or other.evidence > found.traced.evidence:
             found = replace(found, traced=other)
     return found
+
+
+def _starts(fitted: Fitted, best: Fitted) -> Array:
+    """Return where a hypothesis is climbed on from (n, K): where it is, and what it is with what the best one found."""
+    hypothesis, own, reached = fitted.hypothesis, fitted.peak.coordinates[0], best.peak.coordinates[0]
+    crossed = _crossed(hypothesis, own, best.hypothesis, reached)
+    starts = [own, crossed]
+    if hypothesis.effects:
+        # What the best one bent of mass and delay may be the very thing that another effect explains.
+        bent = np.isin(hypothesis.columns, list(BELIEVED))
+        starts += [_afresh(hypothesis, own), np.where(bent, own, crossed)]
+    # Laws that are one another's limits share more than the body: ground friction is breakaway friction without.
+    alike = _crossed(hypothesis, own, best.hypothesis, reached, all_shared=True)
+    if np.any(alike != crossed):
+        alone_in_it = np.isin(hypothesis.columns, best.hypothesis.columns, invert=True)
+        starts += [alike, np.where(alone_in_it, hypothesis.mean - FAINT * hypothesis.spread, alike)]
+    return np.array(starts + ([fitted.traced.coordinates] if fitted.traced is not None else []))
 
 
 def _crossed(
