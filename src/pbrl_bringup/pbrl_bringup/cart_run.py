@@ -180,6 +180,8 @@ class CartRun:
 
     def _asked(self, now: float, floor: CostField, begin: Array) -> LatticePlan | None:
         """Return a plan from a pose (4,) on, and take note of when to ask again."""
+        if not self.navigator.calls:  # a robot that waits for its goal has the time
+            self.navigator.prepare(floor)
         made = self.navigator.plan(now, floor, begin, self.goal)
         found = made is not None
         retry, most = self._navigation.retry, self._navigation.retry_most

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lattice_cases import CELL, Reference, cart_motions, free_state, point_motions, random_grid
 
-from pbrl_planner.lattice import CostGrid, Lattice, LatticeProblem, LatticeSettings, plan
+from pbrl_planner.lattice import CostGrid, Lattice, LatticeProblem, LatticeSettings, plan, planner, warm_up
 from pbrl_planner.lattice.lower_bound import LowerBound
 from pbrl_planner.lattice.moves import _fewer, _needed, relax
 from pbrl_planner.lattice.reach import reach
@@ -179,6 +179,36 @@ def test_arrays_that_are_used_again_change_nothing() -> None:
             made = plan(problem, settings)
             assert (made.cost, made.expansions) == (expected.cost, expected.expansions)
             assert made.poses.tobytes() == expected.poses.tobytes()
+
+
+@pytest.mark.parametrize("cells", [4, 40])
+def test_warming_up_changes_no_plan_and_leaves_memory_for_the_next(cells: int) -> None:
+    grid = CostGrid(np.zeros((cells, cells), dtype=np.uint8), CELL)
+    settings = LatticeSettings(time_limit=600.0, thinned=4)
+    cold, warm = cart_motions(), cart_motions()
+    warm_up(warm, grid, settings)
+    lattice = Lattice(grid, warm)
+    assert warm.shelf.take_records(lattice.cells * lattice.primitives.bins).stamp > 1
+    warm_up(warm, grid, settings)
+    if cells < 10:  # nothing has room there
+        return
+    ends = (1.0, 1.0, 0.0, 0.0), (2.0, 2.5, 1.0, 0.0)
+    expected, made = (plan(LatticeProblem(Lattice(grid, motions), *ends), settings) for motions in (cold, warm))
+    assert (made.cost, made.expansions) == (expected.cost, expected.expansions)
+    assert made.poses.tobytes() == expected.poses.tobytes()
+
+
+@pytest.mark.parametrize("door", [4, 5])
+def test_little_floor_is_searched_before_floods_are_asked(monkeypatch: pytest.MonkeyPatch, door: int) -> None:
+    cells = np.zeros((70, 120), dtype=np.uint8)
+    cells[:, 60:62] = 254
+    cells[30 : 30 + door, 60:62] = 0  # 0.4 m are too little for robot and cart, 0.5 m are not
+    problem = LatticeProblem(
+        Lattice(CostGrid(cells, CELL), cart_motions()), (0.6, 0.6, 1.57, 0.0), (9.2, 2.6, 0.0, 0.0)
+    )
+    monkeypatch.setattr(planner, "reach", lambda *_: pytest.fail("a flood takes longer than the search"))
+    made = plan(problem, LatticeSettings(thinned=8, time_limit=600.0))
+    assert made.found == (door == 5) and made.exhausted != made.found
 
 
 def test_a_plan_within_a_plan_gets_arrays_of_its_own() -> None:

@@ -15,7 +15,7 @@ from scipy.ndimage import binary_dilation
 from pbrl_control.planar import Array, wrap
 from pbrl_planner.costmap import INSCRIBED, LETHAL, CostField
 from pbrl_planner.errors import PlannerError
-from pbrl_planner.lattice import CostGrid, Lattice, LatticePlan, LatticeProblem, LatticeSettings, Motions, plan
+from pbrl_planner.lattice import CostGrid, Lattice, LatticePlan, LatticeProblem, LatticeSettings, Motions, plan, warm_up
 from pbrl_planner.lattice.primitives import TURN
 
 PATIENCE = LatticeSettings(
@@ -102,6 +102,14 @@ class Navigator:
     def resolution(self) -> float:
         """Of the cells that it plans on [m]."""
         return self._motions.primitives.resolution
+
+    def prepare(self, field: CostField) -> None:
+        """Have a plan on a costmap of this size take as long at first as ever after; it takes a second itself.
+
+        Raises:
+            PlannerError: the costmap is none that can be planned on.
+        """
+        warm_up(self._motions, grid_of(field), self._settings)
 
     def plan(
         self, now: float, field: CostField, start: Array, goal: Array, improved: Improved | None = None

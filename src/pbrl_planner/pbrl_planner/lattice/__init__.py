@@ -13,6 +13,7 @@ from pbrl_planner.lattice.primitives import Pace, Primitive, PrimitiveSet
 from pbrl_planner.lattice.problem import LatticeProblem
 from pbrl_planner.lattice.ros_map import read_map
 from pbrl_planner.lattice.settings import LatticeSettings
+from pbrl_planner.lattice.warm_up import warm_up
 
 __all__ = [
     "ArticulatedBody",
@@ -33,5 +34,6 @@ __all__ = [
     "read_environment",
     "read_map",
     "read_primitives",
+    "warm_up",
     "write_primitives",
 ]

@@ -22,12 +22,13 @@ AT_ONCE = 20_000
 LARGEST_HEAP = 1 << 28
 FURTHER = 1.1
 """Times the bound of the start, up to which the lower bound is made before there is a plan."""
-NEAR = 12
-"""Cells from where the search goes to within which no state is left out."""
-SCOUTED = 15_000
+NEAR = 24
+"""Cells from either end of the way within which no state is left out: there is little room where a robot stops."""
+SCOUTED = 5_000
 """Expansions of a search that leaves states out, at most, before it leaves out fewer."""
-SMALL = 2
-"""Of blocks: 4 cells. Only where a search that leaves out so few fails, too, it is asked whether there is any way."""
+PLAIN = 300_000
+"""Expansions of the search that leaves nothing out after those that did, before it is asked whether there is any way:
+where robot and cart are hemmed in only few states are free, and that is soon over."""
 ROOM = 1 << 14
 """Entries of the heap to begin with."""
 
@@ -108,9 +109,11 @@ class _Search:
         while True:
             status = self._round()
             if self._thin and status != kernel.DONE:
-                if self._any is None and self._thin <= SMALL and self._look_for_any():
-                    return self._result(self._best is None, self._reason())
                 place = self._scout_closer(numerators[0])
+                continue
+            if status == kernel.BUDGET and self._in_doubt:
+                if self._look_for_any():
+                    return self._result(self._best is None, self._reason())
                 continue
             if status == kernel.BUDGET:
                 return self._stopped()
@@ -127,7 +130,13 @@ class _Search:
         rows, columns = lattice.cells // lattice.stride, lattice.stride
         blocks = ((rows >> thin) + 1) * ((columns >> thin) + 1) if thin else 0
         self._thin, self._marks = thin, np.zeros((blocks, self._bins), dtype=np.uint8)
-        self._most = min(self._settings.expansions, int(self._numbers[kernel.EXPANDED]) + SCOUTED)
+        more = SCOUTED if thin else PLAIN
+        self._most = min(self._settings.expansions, int(self._numbers[kernel.EXPANDED]) + more)
+
+    @property
+    def _in_doubt(self) -> bool:
+        """Whether searches that left states out have failed, and nothing else has shown yet that there is a way."""
+        return self._settings.thinned > 1 and self._best is None and self._any is None
 
     def _look_for_any(self) -> bool:
         """Find out whether there is any way at all; return whether that, or the way itself, is answer enough."""
@@ -171,7 +180,7 @@ class _Search:
         lattice, tables, sweeps = self._lattice, self._tables, self._sweeps
         cost = lattice.cost.ravel()
         while True:
-            most = self._most if self._thin else self._settings.expansions
+            most = self._most if self._thin or self._in_doubt else self._settings.expansions
             left = most - int(self._numbers[kernel.EXPANDED])
             if left <= 0 or self._elapsed() >= self._settings.time_limit:
                 return kernel.BUDGET
@@ -198,6 +207,7 @@ class _Search:
                 lattice.stride,
                 sweeps,
                 self._thin,
+                self._root,
                 NEAR,
                 self._marks,
             )

@@ -62,6 +62,7 @@ def improve(
     stride: int,
     sweeps: SweepTables,
     thin: int,
+    root: int,
     near: int,
     marks: Byte,
 ) -> int:
@@ -92,7 +93,8 @@ def improve(
         sweeps: see there.
         thin: of the states of a block of 2^thin by 2^thin cells, in each bin, one is expanded; the others wait in the
             list of inconsistent states. 0: all are expanded.
-        near: cells from the goal, along either axis, within which all are.
+        root: number of the state that the search begins in.
+        near: cells from there or from the goal, along either axis, within which all are.
         marks: (blocks, bins) where one was.
 
     Returns:
@@ -115,6 +117,8 @@ def improve(
         best = LIMIT - ((records[goal] >> 16) & COST)
     goal_row = goal // bins // stride
     goal_column = goal // bins - goal_row * stride
+    root_row = root // bins // stride
+    root_column = root // bins - root_row * stride
     blocks = (stride >> thin) + 1
     while expanded < allowed:
         if size == 0:
@@ -137,7 +141,8 @@ def improve(
         if thin > 0:
             row = here // stride
             column = here - row * stride
-            if max(abs(row - goal_row), abs(column - goal_column)) > near:
+            off = max(abs(row - root_row), abs(column - root_column))
+            if min(off, max(abs(row - goal_row), abs(column - goal_column))) > near:
                 block = (row >> thin) * blocks + (column >> thin)
                 if marks[block, b]:
                     if not record & WAITS:

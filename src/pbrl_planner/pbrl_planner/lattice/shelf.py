@@ -58,6 +58,13 @@ class Shelf:
             return Records(np.zeros(states, dtype=np.int64), 1)
         return Records(kept.array, kept.stamp + 1)
 
+    def have_records(self, states: int) -> None:
+        """Have memory for a search over so many states there: what is only promised is cleared by the first search."""
+        records = self.take_records(states)
+        if records.stamp == 1:
+            records.array.fill(0)
+        self.give_back(records)
+
     def give_back(self, records: Records) -> None:
         """Keep an array for the next search."""
         self._records = records

@@ -38,8 +38,6 @@ from pbrl_planner.ros.markers import swept
 from pbrl_planner.ros.one_goal import OneGoal
 from pbrl_planner.ros.running import declare_settings, run_node
 
-PREPARING = 120.0
-"""[s] that a first plan may take, which has everything compiled on a machine where nothing is yet."""
 LOOKS = 50.0
 """Of the thread's news, a second of the steady clock, while it is planned."""
 
@@ -101,8 +99,9 @@ class LatticePlannerNode(Node):
         except PlannerError as error:
             self.get_logger().error(f"/global_costmap/costmap is left aside: {error}", throttle_duration_sec=5.0)
         cart = self.tracker.cart
-        if cart is not None and self._prepared is None:  # what every plan needs takes seconds: not in the first one
-            self._prepared = self._thread.submit(self._prepare, cart)
+        # What every plan needs takes seconds: not in the first one.
+        if cart is not None and self._field is not None and self._prepared is None:
+            self._prepared = self._thread.submit(self._prepare, cart, self._field)
 
     def _want(self, goal: PlanCartPath.Goal) -> None:
         """Plan for a goal, once the thread is done with the one before."""
@@ -144,14 +143,8 @@ class LatticePlannerNode(Node):
 
         return ask(navigator, now, field, begin, aim, improved)
 
-    def _prepare(self, cart: Array) -> None:
-        """Sweep the motions, and have a robot that is nowhere go a little way: what is not compiled yet is then."""
-        moves = self._motions(cart)
-        size = moves.primitives.resolution
-        cells = np.zeros((round(6.0 / size), round(6.0 / size)), np.uint8)
-        floor = CostField(cells, size, (-3.0, -3.0), 0.0)
-        settings = self._settings.planner.model_copy(update={"time_limit": PREPARING})
-        ask(Navigator(moves, settings), 0.0, floor, np.zeros(4), np.array([0.3, 0.0, 0.0]))
+    def _prepare(self, cart: Array, field: CostField) -> None:
+        Navigator(self._motions(cart), self._settings.planner).prepare(field)
 
     def _motions(self, cart: Array) -> Motions:
         length, width = np.ptp(cart, axis=0)
