@@ -124,7 +124,22 @@ def explain(
         likely = tuple(each for each in weigh(bases, [*tried, *more], options) if len(each.effects) != depth)
         tried += [beside_motion(each, grip) for each in _polished(likely, more, stages, options, POLISHED_OF_SETS)]
         weighed = weigh(bases, tried, options)
-    return Explained(weighed, bases, stages, odds)
+    tried = _parts_led(weighed[0].fitted, tried, stages, options)
+    return Explained(weigh(bases, tried, options), bases, stages, odds)
+
+
+def _parts_led(best: Fitted, tried: list[Fitted], stages: Stages, options: DiagnoseOptions) -> list[Fitted]:
+    """Return what was tried, the parts of the likeliest set climbed on from where the set has them.
+
+    An effect of which there is nothing may have done no more than lead the others to a better top.
+    """
+    effects = set(best.hypothesis.effects)
+    return [
+        _climbed_on(each, best, stages, options)
+        if each.hypothesis.effects and set(each.hypothesis.effects) < effects
+        else each
+        for each in tried
+    ]
 
 
 def _grounds_of_sets(likeliest: list[Fitted], track: Track) -> list[Fitted]:
@@ -191,7 +206,7 @@ def _polished(
 def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseOptions) -> Fitted:
     """Return a hypothesis climbed on from where it is, and from where another has the body's own parameters."""
     objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
-    peak = climb(objective, _starts(fitted, best), iterations=LONGER * options.iterations[-1])
+    peak = climb(objective, *_starts(fitted, best), iterations=LONGER * options.iterations[-1])
     better = float(peak.evidence.max()) > float(fitted.peak.evidence[0])
     found = replace(fitted, peak=alone(peak)) if better else fitted
     if found.traced is None or best.traced is None or not best.traced.evidence > found.traced.evidence:
@@ -205,21 +220,32 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
     return found
 
 
-def _starts(fitted: Fitted, best: Fitted) -> Array:
-    """Return where a hypothesis is climbed on from (n, K): where it is, and what it is with what the best one found."""
+def _starts(fitted: Fitted, best: Fitted) -> tuple[Array, Array]:
+    """Return where a hypothesis is climbed on from: where it is, and what it is with what the best one found.
+
+    Returns:
+        Coordinates (n, K), and the windows' nuisances (n, W, NUISANCES) of the one that they are from, or at rest:
+        where a contact is met or missed by how a window begins, coordinates alone do not lead back to where they were
+        good.
+    """
     hypothesis, own, reached = fitted.hypothesis, fitted.peak.coordinates[0], best.peak.coordinates[0]
+    begins, begun = fitted.peak.nuisance[0], best.peak.nuisance[0]
     crossed = _crossed(hypothesis, own, best.hypothesis, reached)
-    starts = [own, crossed]
+    starts = [(own, begins), (crossed, begun)]
     if hypothesis.effects:
         # What the best one bent of mass and delay may be the very thing that another effect explains.
         bent = np.isin(hypothesis.columns, list(BELIEVED))
-        starts += [_afresh(hypothesis, own), np.where(bent, own, crossed)]
+        starts += [(_afresh(hypothesis, own), begins), (np.where(bent, own, crossed), begun)]
     # Laws that are one another's limits share more than the body: ground friction is breakaway friction without.
     alike = _crossed(hypothesis, own, best.hypothesis, reached, all_shared=True)
     if np.any(alike != crossed):
         alone_in_it = np.isin(hypothesis.columns, best.hypothesis.columns, invert=True)
-        starts += [alike, np.where(alone_in_it, hypothesis.mean - FAINT * hypothesis.spread, alike)]
-    return np.array(starts + ([fitted.traced.coordinates] if fitted.traced is not None else []))
+        faint = np.where(alone_in_it, hypothesis.mean - FAINT * hypothesis.spread, alike)
+        starts += [(alike, begun), (faint, begun)]
+    if fitted.traced is not None:
+        starts += [(fitted.traced.coordinates, begins)]
+    coordinates, nuisances = (np.array(each) for each in zip(*starts, strict=True))
+    return np.concatenate([coordinates] * 2), np.concatenate([nuisances, np.zeros_like(nuisances)])
 
 
 def _crossed(

@@ -1,0 +1,49 @@
+"""From where a hypothesis is climbed on: where it is itself, and what it shares with another, windows and all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch import EFFECTS, track_of
+from pbrl_mismatch.data.cuts import cut_windows
+from pbrl_mismatch.search.climb import climb
+from pbrl_mismatch.search.explain import _starts
+from pbrl_mismatch.search.fitted import Fitted, alone, scene_of
+from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
+from pbrl_mismatch.search.objective import Objective
+
+FLOOR = 0.15
+
+
+@pytest.fixture(scope="module")
+def fitted(concealed_recording: Callable[..., Recording]) -> Any:
+    """Return a baseline, and a floor that leans upon it, each fitted to the same windows."""
+    track = track_of(concealed_recording("floor_slope", 1), "table")
+    free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.02), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    sloped = free.with_effect(EFFECTS["floor_slope"], scene_of(track, free.rows(free.mean[None])[0]), 0)
+    cuts = cut_windows(track, 2.0)
+    return [
+        Fitted(each, alone(climb(Objective(each, cuts, FLOOR), each.mean[None], iterations=6)), None)
+        for each in (free, sloped)
+    ]
+
+
+def test_one_start_is_where_it_is(fitted: Any) -> None:
+    for own, other in (fitted, fitted[::-1]):
+        there = climb(own.peak.objective, *_starts(own, other), iterations=0)
+        assert there.evidence[0] == pytest.approx(float(own.peak.evidence[0]), abs=1e-6)
+
+
+def test_what_another_effect_does_nothing_to_is_told_as_well_without_it(fitted: Any) -> None:
+    free, sloped = fitted
+    flat = sloped.peak.coordinates.copy()
+    slope = ~np.isin(sloped.hypothesis.columns, free.hypothesis.columns)
+    flat[0, slope] = sloped.hypothesis.mean[slope]
+    nothing = Fitted(sloped.hypothesis, climb(sloped.peak.objective, flat, sloped.peak.nuisance, iterations=0), None)
+    led = climb(free.peak.objective, *_starts(free, nothing), iterations=0)
+    assert led.misfit[1] == pytest.approx(nothing.peak.misfit[0], rel=1e-9)
