@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 from pbrl_bag.types import Recording
 from pbrl_mismatch import EFFECTS, track_of
 from pbrl_mismatch.data.cuts import cut_windows
+from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.explain import _starts
-from pbrl_mismatch.search.fitted import Fitted, alone, scene_of
+from pbrl_mismatch.search.explain import _parts_led, _starts
+from pbrl_mismatch.search.fitted import Fitted, Stages, alone, scene_of
+from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.objective import Objective
 
@@ -47,3 +50,25 @@ def test_what_another_effect_does_nothing_to_is_told_as_well_without_it(fitted: 
     nothing = Fitted(sloped.hypothesis, climb(sloped.peak.objective, flat, sloped.peak.nuisance, iterations=0), None)
     led = climb(free.peak.objective, *_starts(free, nothing), iterations=0)
     assert led.misfit[1] == pytest.approx(nothing.peak.misfit[0], rel=1e-9)
+
+
+def with_effects(fitted: Fitted, *effects: str) -> Fitted:
+    return replace(fitted, hypothesis=replace(fitted.hypothesis, effects=effects))
+
+
+def test_parts_of_a_set_are_led_to_where_it_has_them_and_nothing_else_is(fitted: Any) -> None:
+    sloped = fitted[1]
+    stages, options = Stages((sloped.peak.objective.cuts,), ()), DiagnoseOptions()
+    began = sloped.hypothesis.mean[None]
+    short = replace(sloped, peak=climb(sloped.peak.objective, began, iterations=0))
+    other = with_effects(short, "detent")
+    led = _parts_led(with_effects(sloped, "floor_slope", "time_offset"), [short, other], stages, options)
+    assert led[0].evidence >= sloped.evidence - 1e-6 > short.evidence
+    assert led[1] is other
+
+
+def test_a_hold_that_gives_way_leads_nothing(fitted: Any) -> None:
+    sloped = fitted[1]
+    stages, options = Stages((sloped.peak.objective.cuts,), ()), DiagnoseOptions()
+    tried = [sloped, with_effects(sloped, GRASP_COMPLIANCE)]
+    assert _parts_led(with_effects(sloped, "floor_slope", GRASP_COMPLIANCE), tried, stages, options) is tried

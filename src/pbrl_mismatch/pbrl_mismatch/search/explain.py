@@ -124,16 +124,19 @@ def explain(
         likely = tuple(each for each in weigh(bases, [*tried, *more], options) if len(each.effects) != depth)
         tried += [beside_motion(each, grip) for each in _polished(likely, more, stages, options, POLISHED_OF_SETS)]
         weighed = weigh(bases, tried, options)
-    tried = _parts_led(weighed[0].fitted, tried, stages, options)
+    tried = [beside_motion(each, grip) for each in _parts_led(weighed[0].fitted, tried, stages, options)]
     return Explained(weigh(bases, tried, options), bases, stages, odds)
 
 
 def _parts_led(best: Fitted, tried: list[Fitted], stages: Stages, options: DiagnoseOptions) -> list[Fitted]:
     """Return what was tried, the parts of the likeliest set climbed on from where the set has them.
 
-    An effect of which there is nothing may have done no more than lead the others to a better top.
+    An effect of which there is nothing may have done no more than lead the others to a better top; not a hold that
+    gives way, which is laid on a top as it is and learned beside the motion.
     """
-    effects = set(best.hypothesis.effects)
+    effects = set(best.hypothesis.effects) - {GRASP_COMPLIANCE}
+    if len(effects) < len(best.hypothesis.effects):
+        return tried
     return [
         _climbed_on(each, best, stages, options)
         if each.hypothesis.effects and set(each.hypothesis.effects) < effects
