@@ -145,6 +145,18 @@ def test_a_fixture_stays(lab: Any) -> None:
     np.testing.assert_allclose(world.truth("counter").planar, [1, 1, 0.3], atol=1e-9)
 
 
+def test_a_fixture_on_the_wall_leaves_room_underneath(lab: Any) -> None:
+    slab = {"kind": "fixture", "polygon": L_SHAPE, "height": 0.74, "underside": 0.70, "pose": [1, 1, 0.3]}
+    world = lab.world(lab.scene({"slab": slab}))
+    middle = world.find("slab").pose().position[:2]
+    down = world.client.api.rayTest([*middle, 2.0], [*middle, 0.1])[0]
+    up = world.client.api.rayTest([*middle, 0.1], [*middle, 2.0])[0]
+    assert [hit[3][2] for hit in (down, up)] == pytest.approx([0.74, 0.70], abs=2e-3)  # Bullet's own margin
+    assert world.find("slab").settings.levels == (0.70, 0.74)
+    with pytest.raises(SimError, match="underside below the height"):
+        lab.scene({"slab": slab | {"underside": 0.8}})
+
+
 def test_convex_parts_cover_the_outline_and_nothing_else() -> None:
     parts = [Polygon(part) for part in convex_parts(np.array(L_SHAPE, dtype=float))]
     assert all(math.isclose(part.convex_hull.area, part.area) for part in parts)

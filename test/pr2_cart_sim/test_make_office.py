@@ -81,6 +81,16 @@ def test_same_seed_same_office_and_other_seed_another():
     assert one[1] != other[1]
 
 
+def test_desks_and_tables_may_be_fixed_to_the_walls_and_nothing_else_changes():
+    _, plain = make_office(OfficePlan(), 3)
+    _, hung = make_office(OfficePlan(hung=1.0), 3)
+    raised = {name for name, body in hung["clutter"].items() if "underside" in body}
+    assert raised == {name for name in plain["clutter"] if "_desk_" in name or "_table_" in name}
+    for body in hung["clutter"].values():
+        assert 0.6 < body.pop("underside", 0.7) < body["height"] or body["kind"] == "block"
+    assert hung == plain
+
+
 @pytest.mark.parametrize("rooms", [2, 3, 7])
 def test_small_and_large_offices(rooms):
     _, scene = office(5, rooms=rooms, people=0, movable=0)

@@ -283,14 +283,22 @@ class Fixture(Settings):
 
     Attributes:
         polygon: outline [m] in the body's frame.
-        height: [m].
+        height: of its upper face [m].
+        underside: height of its lower face [m]: 0 for what stands on the floor, more for what is fixed to a wall.
         pose: (x, y, theta) of the body's frame.
     """
 
     kind: Literal["fixture"]
     polygon: Outline
     height: Positive
+    underside: NonNegative = 0.0
     pose: Vector3 = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _has_thickness(self) -> Self:
+        if self.underside >= self.height:
+            raise ValueError(f"expected an underside below the height {self.height:g} m, got {self.underside:g} m")
+        return self
 
     @property
     def footprint(self) -> Array:
@@ -300,7 +308,7 @@ class Fixture(Settings):
     @property
     def levels(self) -> tuple[float, float]:
         """Heights [m] between which the footprint is solid."""
-        return 0.0, self.height
+        return self.underside, self.height
 
 
 Body = Annotated[OfficeTable | UtilityCart | PlainTable | Block | Fixture, Field(discriminator="kind")]

@@ -30,11 +30,12 @@ def build_prism(client: BulletClient, name: str, prism: Block | Fixture, *, mass
     block = isinstance(prism, Block)
     weight = (prism.nominal_mass if mass is None else mass) if isinstance(prism, Block) else 0.0
     colour = (0.42, 0.55, 0.68, 1.0) if block else (0.70, 0.70, 0.72, 1.0)
-    parts = convex_parts(prism.footprint)
+    bottom, top = prism.levels
+    parts, thickness, middle = convex_parts(prism.footprint), top - bottom, (bottom + top) / 2
     centres = [np.array(Polygon(part).centroid.coords[0]) for part in parts]
     areas = np.array([Polygon(part).area for part in parts])
     masses = weight * areas / areas.sum()
-    shapes = [_shapes(client, part - centre, prism.height, colour) for part, centre in zip(parts, centres, strict=True)]
+    shapes = [_shapes(client, part - centre, thickness, colour) for part, centre in zip(parts, centres, strict=True)]
     x, y, theta = prism.pose
     cos, sin = np.cos(theta), np.sin(theta)
     base = np.array([x, y]) + np.array([[cos, -sin], [sin, cos]]) @ centres[0]
@@ -43,7 +44,7 @@ def build_prism(client: BulletClient, name: str, prism: Block | Fixture, *, mass
         baseMass=float(masses[0]),
         baseCollisionShapeIndex=shapes[0][0],
         baseVisualShapeIndex=shapes[0][1],
-        basePosition=[*base, prism.height / 2],
+        basePosition=[*base, middle],
         baseOrientation=yaw_quaternion(theta).tolist(),
         linkMasses=[float(masses[part]) for part in others],
         linkCollisionShapeIndices=[shapes[part][0] for part in others],
@@ -61,9 +62,9 @@ def build_prism(client: BulletClient, name: str, prism: Block | Fixture, *, mass
     for link, (part, centre) in enumerate(zip(parts, centres, strict=True), start=-1):
         options = {"lateralFriction": friction, "rollingFriction": 0, "spinningFriction": 0, "restitution": 0}
         if block:
-            options["localInertiaDiagonal"] = _inertia(part - centre, prism.height, float(masses[link + 1])).tolist()
+            options["localInertiaDiagonal"] = _inertia(part - centre, thickness, float(masses[link + 1])).tolist()
         client.api.changeDynamics(body, link, **options)
-    return Furniture(client, name, prism, np.array([*-centres[0], prism.height / 2]))
+    return Furniture(client, name, prism, np.array([*-centres[0], middle]))
 
 
 def convex_parts(outline: Array) -> list[Array]:

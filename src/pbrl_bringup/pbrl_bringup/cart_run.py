@@ -33,8 +33,6 @@ TICK = 0.05
 SIDES = ("left", "right")
 LONGEST = 300.0
 """Simulated time after which a leg is given up [s]."""
-REFRESH = 15.0
-"""Time on one plan after which it is made again: the floor is better known by then [s]."""
 AHEAD, ENOUGH = 0.3, 1.5
 """Way [m, rad] along a plan after which the next one begins; what is left of it at least for that to be worth it."""
 IN_THE_WAY = (Cause.OBSTACLE, Cause.FOOTPRINT)
@@ -153,7 +151,7 @@ class CartRun:
                 self._set_out(now)
         else:
             going.blocked = None
-            if now - going.since >= REFRESH and now >= self._next_plan:
+            if now - going.since >= self._navigation.refresh and now >= self._next_plan:
                 self._go_over(now, going, command.goal)
 
     def _give_up(self, now: float, going: _Going, command: CartCommand) -> None:

@@ -53,6 +53,7 @@ EXPERIMENTS = {
     "namo-concealed": "a carpet, a tether or an unseen body in the way: who asks what was met, and who does not",
     "namo-scaling": "figures 34 and 35: time to plan among 5 to 80 movable obstacles",
     "cart-office": "section 4.6 and table 1: the PR2 pushes a cart through offices with people for an hour",
+    "cart-desks": "desks on walls, which a laser low over the floor does not see: with the tilting one, and without",
     "cart-turn": "figure 18: what robot and cart sweep in a turn by 90 degrees, with and without articulation",
     "cart-doors": "chapter 4: the narrowest doorways and corners that robot and cart get through, both ways",
     "displacement-models": "figure 2: what six pushes do to three items, learned, and compared with 200 more pushes",

@@ -29,6 +29,13 @@ def placed(points: Array, pose: Array) -> Array:
     return np.asarray(points @ rotation(float(pose[2])).T + pose[:2])
 
 
+def on_floor(pose: Array) -> Array:
+    """Return a pose (3,) as a matrix (4, 4): upright, at height 0."""
+    found = np.eye(4)
+    found[:2, :2], found[:2, 3] = rotation(float(pose[2])), pose[:2]
+    return found
+
+
 def compose(a: Array, b: Array) -> Array:
     """Return the pose (3,) of c in the frame of a's parent, given a, and b = c in the frame of a."""
     x, y = a[:2] + rotation(a[2]) @ b[:2]

@@ -83,12 +83,32 @@ class Pr2Arms:
         Raises:
             ControlError: there is no such frame.
         """
-        if not self._model.existFrame(frame):
-            raise ControlError(f"robot description: expected a frame {frame!r}, got none of that name")
+        found = self._frame(frame)
         pin.forwardKinematics(self._model, self._data, pin.neutral(self._model))
-        placed = pin.updateFramePlacement(self._model, self._data, self._model.getFrameId(frame))
+        placed = pin.updateFramePlacement(self._model, self._data, found)
         x, y, _ = placed.translation
         return np.array([x, y, math.atan2(placed.rotation[1, 0], placed.rotation[0, 0])])
+
+    def frame_pose(self, frame: str, names: Sequence[str], positions: Sequence[float] | Array) -> Array:
+        """Return the pose (4, 4) in `base` of a frame, with joints where they are.
+
+        Args:
+            frame: its name.
+            names: of the joints whose positions are known.
+            positions: (n,) of them [rad], [m]; other joints are taken at zero.
+
+        Raises:
+            ControlError: there is no such frame.
+        """
+        table = dict(zip(names, map(float, positions), strict=True))
+        pin.forwardKinematics(self._model, self._data, self._configuration(table))
+        placed = pin.updateFramePlacement(self._model, self._data, self._frame(frame))
+        return np.array(placed.homogeneous)
+
+    def _frame(self, name: str) -> int:
+        if not self._model.existFrame(name):
+            raise ControlError(f"robot description: expected a frame {name!r}, got none of that name")
+        return int(self._model.getFrameId(name))
 
     def _jacobian(self, side: int) -> Array:
         frame = self._frames[side]

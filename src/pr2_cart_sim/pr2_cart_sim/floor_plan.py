@@ -52,6 +52,8 @@ class OfficePlan(Settings):
         wall: thickness of the walls [m].
         resolution: of the map [m].
         furniture: pieces in a room, at least and at most; none of them is in the map.
+        hung: share of desks and tables that are fixed to the wall, with room underneath: a laser low over the floor
+            does not see them.
         movable: how many chairs there are that can be pushed.
         corridor_things: how many things stand at the corridor's walls.
         people: how many people walk about.
@@ -66,6 +68,7 @@ class OfficePlan(Settings):
     wall: Annotated[float, Field(ge=0.05, le=0.5)] = 0.15
     resolution: Annotated[float, Field(ge=0.01, le=0.2)] = 0.05
     furniture: tuple[Annotated[int, Field(ge=0, le=8)], Annotated[int, Field(ge=0, le=8)]] = (1, 3)
+    hung: Annotated[float, Field(ge=0, le=1)] = 0.0
     movable: Annotated[int, Field(ge=0, le=20)] = 2
     corridor_things: Annotated[int, Field(ge=0, le=20)] = 2
     people: Annotated[int, Field(ge=0, le=50)] = 5

@@ -33,6 +33,10 @@ TORSO = 0.244
 """Height of the torso's lift [m] at which the fingers are level with the cart's bar."""
 PIECES = {"desk": (1.4, 0.7, 0.74), "cabinet": (0.8, 0.45, 1.2), "table": (1.0, 0.8, 0.74), "shelf": (1.2, 0.35, 1.8)}
 """Length, depth, height [m]; the length lies along a wall."""
+SLAB = 0.04
+"""Thickness of a top that is fixed to the wall [m]."""
+HUNG = ("desk", "table")
+"""Pieces that may be."""
 CHAIR = {"kind": "block", "height": 0.48, "nominal_mass": 9.0, "friction": 0.25}
 TRIES = 40
 WAY = 0.75
@@ -62,7 +66,7 @@ def make_office(plan: OfficePlan, seed: int) -> tuple[GridMap, dict[str, Any]]:
         "robot": {"pose": _rounded(start), "torso": TORSO, "posture": DEFAULT_POSTURE, "holds": "cart"},
         "bodies": {"cart": CART | {"pose": _rounded([start[0] + AHEAD, *start[1:]])}},
         "goals": {name: _rounded(pose) for name, pose in goals.items()},
-        "clutter": _furnish(plan, floor, rng),
+        "clutter": _hang(plan.hung, _furnish(plan, floor, rng), seed),
         "people": _people(plan, floor, rng),
     }
     return grid, scene
@@ -144,6 +148,15 @@ def _furnish(plan: OfficePlan, floor: FloorPlan, rng: Generator) -> dict[str, An
     return clutter
 
 
+def _hang(share: float, clutter: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Fix a share of desks and tables to the wall instead; all else stays as it was drawn."""
+    rng = np.random.default_rng([seed, 1])
+    for name, body in clutter.items():
+        if any(f"_{kind}_" in name for kind in HUNG) and rng.random() < share:
+            body["underside"] = round(body["height"] - SLAB, 3)
+    return clutter
+
+
 def _at_wall(floor: tuple[float, float, float, float], size: tuple[float, float, float], rng: Generator) -> Any:
     """Draw a place for a piece with its back to one of a room's walls."""
     left, bottom, right, top = floor
@@ -201,6 +214,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of every draw")
     for name, text in {"rooms": "north of the corridor", "people": "that walk about", "movable": "chairs"}.items():
         parser.add_argument(f"--{name}", type=int, help=f"how many {text}")
+    parser.add_argument("--hung", type=float, help="share of desks and tables that are fixed to the wall, 0 to 1")
     given = {name: value for name, value in vars(parser.parse_args()).items() if value is not None}
     path, seed = given.pop("path"), given.pop("seed")
     try:

@@ -59,3 +59,20 @@ def test_a_goal_in_a_wall_is_a_proved_failure_and_it_stays_where_it_is(hall: Off
     assert not done.reached and {call.answer for call in done.calls} == {Answer.GOAL_TAKEN}
     assert len(done.calls) == 2, "it waits and tries again"
     assert done.score.way < 0.01 and "something stands where the goal is" in done.sentence
+
+
+@pytest.mark.parametrize(("tilt", "contact"), [({"increment": 0.04}, False), ({"increment": 0.5, "rate": 0.1}, True)])
+def test_a_slab_on_the_wall_is_seen_by_the_tilting_laser_only(hall: OfficeScene, tilt: dict, contact: bool) -> None:
+    told = hall.model_dump()
+    corners = [[0, 0], [0.7, 0], [0.7, 1.7], [0, 1.7]]
+    told["clutter"]["slab"] = {
+        "kind": "fixture",
+        "polygon": corners,
+        "height": 0.74,
+        "underside": 0.70,
+        "pose": [3.2, 1.3, 0.0],
+    }
+    told["sensors"]["tilt_laser"] |= {"rate": 20.0} | tilt
+    done = run_cart(OfficeScene.model_validate(told), np.array([2.2, 1.5, 0.0]), 1, longest=6.0, coarse=True)
+    assert ("slab" in {touch.other for touch in done.score.contacts}) == contact, done.sentence
+    assert contact or not done.reached

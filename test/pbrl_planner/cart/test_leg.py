@@ -122,3 +122,29 @@ def test_no_order_of_events_leaves_it_with_nothing_to_do_for_ever() -> None:
                 assert leg.state in ENDED
                 break
             assert now < 5000.0 and leg.state not in ENDED
+
+
+def test_on_the_way_a_better_path_is_looked_for_from_time_to_time() -> None:
+    leg = driving()
+    assert leg.driving(15.0, 0.0, "") is Order.NOTHING and leg.driving(15.2, 0.0, "") is Order.REFINE
+    assert leg.driving(16.0, 3.0, "somebody") is Order.NOTHING, "one question at a time"
+    assert leg.driving(16.5, 0.0, "") is Order.NOTHING
+    assert leg.planned(17.0, Outcome.FOUND, "") is Order.SWITCH and leg.state is LegState.DRIVING
+    assert leg.driving(30.0, 0.0, "") is Order.NOTHING and leg.driving(32.1, 0.0, "") is Order.REFINE
+    assert leg.planned(33.0, Outcome.NO_PATH, "") is Order.NOTHING and leg.state is LegState.DRIVING
+    assert (leg.plans, leg.failures) == (3, 1)
+
+
+def test_a_better_path_for_a_drive_that_has_ended_is_no_path_from_here() -> None:
+    leg = driving()
+    assert leg.driving(16.0, 0.0, "") is Order.REFINE
+    assert leg.drove(Drove.REPLAN, "off the path") is Order.CLEAR and leg.tick(18.0) is Order.NOTHING
+    assert leg.planned(18.5, Outcome.FOUND, "") is Order.NOTHING and leg.tick(18.6) is Order.PLAN
+
+
+def test_where_too_little_is_left_nothing_is_asked() -> None:
+    leg = driving()
+    assert leg.driving(16.0, 0.0, "") is Order.REFINE
+    leg.nothing_ahead(16.0)
+    assert not leg.asked and leg.driving(20.0, 0.0, "") is Order.NOTHING
+    assert leg.driving(21.0, 2.5, "somebody") is Order.PLAN

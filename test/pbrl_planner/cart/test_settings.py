@@ -25,7 +25,7 @@ def test_what_is_shipped_stops_in_time_and_plans_as_wide_as_it_drives() -> None:
     ("old", "new", "word"),
     [
         ("stop_within: 0.3", "stop_within: -1.0", "stop_within"),
-        ("retry: 2.0", "retries: 2.0", "retry"),
+        ("retry: 2.0", "rettry: 2.0", "retry"),
         ("epsilon: 3.0", "epsilon: 0.5", "epsilon"),
         ("planner:", "[", "settings"),
     ],

@@ -95,6 +95,8 @@ def test_it_drives_to_the_end_of_a_path(driving: Driving) -> None:
     assert driving.speed() == 0.0, "the last command stops it"
     left = [each.remaining for each in driving.told]
     assert left[0] > 1.5 and left[-1] < 0.2 and all(a >= b - 1e-9 for a, b in pairwise(left))
+    passed = [each.passed for each in driving.told]
+    assert 1 <= passed[0] <= passed[len(passed) // 2] <= passed[-1] and passed == sorted(passed)
     assert driving.arms and len(driving.arms[0].data) == 7
     assert driving.status[-1].data == "arrived"
 

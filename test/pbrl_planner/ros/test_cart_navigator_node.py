@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from pbrl_planner.ros.one_goal import OneGoal
 
 Plan, Follow = PlanCartPath.Result, FollowCartPath.Result
 PATH = path_to_msg(np.array([[1.0, 1.5, 0.0, 0.0], [2.0, 1.5, 0.0, 0.0]]), 1.0)
+LONG = np.column_stack((np.arange(0.0, 10.01, 0.05), np.full((201, 3), [1.5, 0.0, 0.0])))
 
 
 def goal(x: float = 2.0, frame: str = "map") -> PoseStamped:
@@ -82,10 +84,11 @@ class Play:
     def says(self, word: str) -> None:
         self.until(lambda: any(word in each.data for each in self.status))
 
-    def answer(self, outcome: int, message: str = "", count: int = 1) -> None:
+    def answer(self, outcome: int, message: str = "", count: int = 1, poses: Any = None) -> None:
         """Answer the planner's question number `count`."""
         self.until(lambda: len(self.asked) >= count)
         path = PATH if outcome == Plan.FOUND else type(PATH)()
+        path = path if poses is None else path_to_msg(poses, 1.0)
         self.planner.end(Plan(outcome=outcome, message=message, path=path), outcome == Plan.FOUND)
 
     def driving(self, **fields: Any) -> None:
@@ -156,6 +159,59 @@ def test_who_stands_before_something_looks_for_a_way_round(play: Play) -> None:
     play.until(lambda: len(play.given) == 2)
     play.ended(Follow.ARRIVED)
     play.says("arrived")
+
+
+def under_way(play: Play, condition: Callable[[], Any], passed: int) -> None:
+    """Drive on until a condition holds, and tell how many poses lie behind."""
+
+    told = [0.0]
+
+    def drive() -> Any:
+        if play.stage.time > told[0] + 0.2:  # more than that would only be in the way of the clock
+            told[0] = play.stage.time
+            play.driving(status="on the way", passed=passed)
+        return condition()
+
+    play.until(drive)
+
+
+def after(play: Play, seconds: float) -> Callable[[], bool]:
+    end = play.stage.time + seconds
+    return lambda: play.stage.time > end
+
+
+def test_on_the_way_a_better_path_is_taken_on_from_a_place_ahead(play: Play) -> None:
+    play.stage.send("/goal_pose", goal(10.0))
+    play.answer(Plan.FOUND, poses=LONG)
+    play.until(lambda: play.given)
+    under_way(play, lambda: len(play.asked) == 2, 41)
+    begin = play.asked[1].start.pose.position
+    assert play.asked[1].use_start and begin.x > LONG[40, 0] + 5.0 * 0.35, "nobody is there before it is planned"
+    assert play.asked[1].goal.pose.position.x == 10.0
+    round_it = np.array([[begin.x, 1.5, 0.0, 0.0], [begin.x + 1.0, 2.0, 0.0, 0.0], [10.0, 1.5, 0.0, 0.0]])
+    play.answer(Plan.FOUND, count=2, poses=round_it)
+    play.until(lambda: len(play.given) == 2)
+    told = [each.pose.position for each in play.given[1].path.path.poses]
+    assert told[0].x == pytest.approx(LONG[40, 0]) and (told[-2].y, told[-1].x) == (2.0, 10.0)
+    assert max(b.x - a.x for a, b in pairwise(told[:-2])) < 0.06, "without a gap"
+    play.ended(Follow.ARRIVED)
+    play.says("arrived")
+
+
+def test_a_better_path_that_comes_too_late_or_is_the_same_changes_nothing(play: Play) -> None:
+    play.stage.send("/goal_pose", goal(10.0))
+    play.answer(Plan.FOUND, poses=LONG)
+    play.until(lambda: play.given)
+    under_way(play, lambda: len(play.asked) == 2, 11)
+    begin = play.asked[1].start.pose.position.x
+    play.answer(Plan.FOUND, count=2, poses=LONG[LONG[:, 0] >= begin - 1e-6])
+    under_way(play, lambda: len(play.asked) == 3, 21)
+    under_way(play, after(play, 1.0), 190)
+    play.answer(Plan.FOUND, count=3, poses=np.array([[begin, 1.5, 0.0, 0.0], [10.0, 2.5, 0.0, 0.0]]))
+    under_way(play, after(play, 17.0), 195)
+    play.ended(Follow.ARRIVED)
+    play.says("arrived")
+    assert len(play.given) == 1 and len(play.asked) == 3, "near the end nothing is asked"
 
 
 def test_a_path_that_is_given_up_is_planned_again_on_cleared_costmaps(play: Play) -> None:

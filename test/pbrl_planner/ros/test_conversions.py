@@ -31,7 +31,7 @@ from pbrl_planner.ros.conversions import (
     scan_from_msg,
     stamp_of,
 )
-from pbrl_planner.ros.frames import Frames
+from pbrl_planner.ros.frames import Frames, NotYetError
 
 
 def over_the_wire(message: Any) -> Any:
@@ -169,3 +169,30 @@ def test_frames_are_chained_from_base_to_the_sensor() -> None:
     frames.hear(TFMessage(transforms=[frame("laser", "mast", 0.0)]))
     with pytest.raises(PlannerError, match="expected its place"):
         frames.planar("laser", "base")  # a ring
+
+
+def test_of_a_frame_that_moves_the_pose_at_a_time_lies_between_two() -> None:
+    frames = Frames()
+    frames.hear(TFMessage(transforms=[frame("base", "mast", 1.0)]))
+
+    def nod(time: float, lean: float) -> None:
+        each = frame("mast", "laser", 0.5 + time, lean=lean)
+        each.header.stamp = stamp_of(time)
+        frames.hear_moving(TFMessage(transforms=[each]))
+
+    nod(1.0, 0.2)
+    with pytest.raises(NotYetError, match=r"heard it until 1\.000 s"):
+        frames.pose("laser", "base", 1.01)
+    nod(1.02, 0.4)
+    found = frames.pose("laser", "base", 1.005)
+    assert found[:3, 3] == pytest.approx([2.505, 0.0, 0.0]) and math.acos(found[1, 1]) == pytest.approx(0.25)
+    assert math.acos(frames.pose("laser", "base")[1, 1]) == pytest.approx(0.4), "the newest, where no time is told"
+    with pytest.raises(PlannerError, match="nobody has said it"):
+        frames.pose("laser", "base", 0.9)
+    nod(9.0, 0.2)
+    with pytest.raises(PlannerError, match="nobody has said it"):
+        frames.pose("laser", "base", 5.0)  # too long between two
+    nod(0.5, 0.3)  # the clock has begun again
+    assert math.acos(frames.pose("laser", "base", 0.5)[1, 1]) == pytest.approx(0.3)
+    with pytest.raises(NotYetError):
+        frames.pose("laser", "base", 1.0)

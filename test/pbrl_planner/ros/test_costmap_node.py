@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
 
 from pbrl_control.ros.qos import LATCHED
 from pbrl_planner.costmap import LETHAL, CostField
@@ -132,6 +134,38 @@ def test_nonsense_is_left_aside_and_the_next_scan_counts(mapping: Mapping) -> No
     torn.data = torn.data[:100]
     mapping.stage.send("/map", torn, LATCHED)
     assert mapping.look().time == pytest.approx(mapping.stage.time)
+
+
+def nod(time: float, lean: float) -> TFMessage:
+    """The nodding laser 1.2 m over `base`, looking down by an angle [rad]."""
+    each = TransformStamped(child_frame_id="laser_tilt_link")
+    each.header.frame_id, each.header.stamp = "base", stamp_of(time)
+    each.transform.translation.z = 1.2
+    each.transform.rotation.y, each.transform.rotation.w = np.sin(lean / 2), np.cos(lean / 2)
+    return TFMessage(transforms=[each])
+
+
+def test_what_hangs_over_the_floor_is_marked_once_it_is_known_how_the_laser_stood(mapping: Mapping) -> None:
+    """Beams look 0.4 rad down and end 2 m ahead, 0.42 m over the floor; 0.1 rad more, and they end on the floor."""
+    place = mapping.stage.pose[:2] + np.array([2.0 * np.cos(0.4), 0.0])
+    message = LaserScan(angle_min=-0.02, angle_max=0.02, angle_increment=0.01, range_min=0.1, range_max=30.0)
+    message.header.frame_id, message.ranges = "laser_tilt_link", [2.0] * 5
+
+    def sees(*frames: tuple[float, float]) -> bool:
+        """Whether it is marked after a scan of now, and the laser's lean [rad] told at times from now on [s]."""
+        time = mapping.stage.time
+        message.header.stamp = stamp_of(time)
+        mapping.stage.send("/tilt_scan", message)
+        for off, lean in frames:
+            mapping.stage.send("/tf", nod(time + off, lean))
+        return mapping.look(aside=np.inf).cost(*place) == LETHAL
+
+    assert not sees((-0.02, 0.3)), "/tf has not come that far"
+    mapping.stage.until(lambda: sees((-0.02, 0.3), (0.02, 0.5)))
+    before = len(mapping.whole)
+    mapping.stage.tick(0.6)
+    mapping.stage.until(lambda: len(mapping.whole) > before)
+    assert field_from_msg(mapping.whole[-1]).cost(*place) == LETHAL
 
 
 def test_a_clock_that_begins_again_begins_the_costmaps_again(mapping: Mapping) -> None:

@@ -9,14 +9,14 @@ import numpy as np
 from bullet_sim.observations import GraspState, JointStates, KnownScene, RobotDescription
 from pbrl_control.cart import CartBody, CartPercept, CartSight, choose_sight
 from pbrl_control.cart.whereabouts import Whereabouts
-from pbrl_control.planar import Array, compose
+from pbrl_control.planar import Array, compose, on_floor
 from pbrl_control.pr2_arms import Pr2Arms
 from pbrl_planner.cart.outline import GRIP, frame_at_grip, pr2_with
 from pbrl_planner.cart.shoulders import with_shoulders
 from pbrl_planner.costmap import CostField, Costmap, CostmapSettings, EvidenceSettings, RangeScan, Recovery, StaticMap
 from pr2_cart_sim.observations import BaseOdometry, CartReading, KnownMap, Localisation, Scan
 
-LASER = "base_laser_link"
+LASER, NODDING = "base_laser_link", "laser_tilt_link"
 LOCAL = CostmapSettings()
 WHOLE = CostmapSettings(mark_range=6.0, clear_range=8.0, evidence=EvidenceSettings(memory=60.0))
 """Of the floor that is planned on: what was seen of it is remembered for about as long as a room is left."""
@@ -156,13 +156,18 @@ class CartSenses:
     @hear.register
     def _(self, observation: Scan) -> None:
         pose = self.whereabouts.pose(observation.time)
-        if observation.laser != "base" or pose is None:
+        if pose is None:
             return
         scan = RangeScan(
             observation.time, observation.angle_min, observation.increment, observation.span, observation.ranges
         )
-        laser, own = compose(pose, self._laser), self._own(observation.time)
-        self.local.recentre(float(pose[0]), float(pose[1]))
-        for costs in (self.local, self.whole):
-            if costs is not None:
-                costs.observe(scan, laser, own)
+        own = self._own(observation.time)
+        maps = [each for each in (self.local, self.whole) if each is not None]
+        if observation.laser == "base":
+            self.local.recentre(float(pose[0]), float(pose[1]))
+            for costs in maps:
+                costs.observe(scan, compose(pose, self._laser), own)
+        elif self._arms is not None and self._joints is not None:
+            nodding = on_floor(pose) @ self._arms.frame_pose(NODDING, self._joints.names, self._joints.position)
+            for costs in maps:
+                costs.observe_nodding(scan, nodding, own)

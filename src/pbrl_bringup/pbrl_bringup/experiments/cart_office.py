@@ -8,7 +8,7 @@ is counted as in the thesis: expansions and time until the first plan (epsilon 3
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,10 +40,11 @@ FAR = 0.5
 """Of the greatest distance between two goals of an office, which the next goal is away at least."""
 MANNERS = {"social": True, "step_in_rate": 1.0}
 """People stop before robot and cart; now and then somebody steps in front of them."""
-TILT = {"rate": 0.5, "increment": 0.1}
-"""Of the tilting laser, to which nobody listens here: each of its scans takes as long as one of the base's."""
-PEOPLE = 3
-"""Who walk to and fro. They go straight on: in a corridor where none can pass beside the cart each stops all others."""
+TILT = {"rate": 20.0, "increment": 0.04}
+"""Of the tilting laser: a ninth of its beams, since each costs as much to cast as one of the base's."""
+OFFICE = {"people": 3}
+"""People walk to and fro. They go straight on: in a corridor where none can pass beside the cart each stops all others.
+"""
 FIRST_PLAN, SHARE_OPTIMAL = 0.05, 0.95
 POSITION, ANGLE = 0.03, math.radians(2.0)
 TICK = 2.0
@@ -102,13 +103,13 @@ def measure(seed: int, quick: bool, out: Path) -> Measured:
     return Measured(rows_of(found), {"legs": told})
 
 
-def leg_of(seed: int, number: int, out: Path) -> Leg:
-    """Return a leg; its office is made if it is not there yet."""
+def leg_of(seed: int, number: int, out: Path, office: Mapping[str, Any] = OFFICE) -> Leg:
+    """Return a leg; its office, what is told of it beyond `OfficePlan`'s own, is made if it is not there yet."""
     which = number // LEGS
     file = out / "offices" / f"office_{which}.yaml"
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
-        plan = parse_settings({"people": PEOPLE}, OfficePlan, "the experiment's office")
+        plan = parse_settings(dict(office), OfficePlan, "the experiment's office")
         write_office(file, plan, int(np.random.default_rng([seed, which]).integers(2**31)))
     scene = load_office(file)
     goals = {name: tuple(map(float, pose)) for name, pose in scene.goals.items()}
@@ -139,11 +140,13 @@ def route(places: dict[str, tuple[float, ...]], start: str, count: int, rng: np.
     return found
 
 
-def driven(legs: Sequence[Leg], seed: int, longest: float, out: Path) -> list[CartOutcome]:
+def driven(
+    legs: Sequence[Leg], seed: int, longest: float, out: Path, tilt: Mapping[str, Any] = TILT
+) -> list[CartOutcome]:
     """Return what became of legs; those that were kept are not driven again."""
     paths = [out / "legs" / f"leg_{leg.number:03d}.json" for leg in legs]
     jobs = [
-        (leg, seed, longest, path)
+        (leg, seed, longest, path, tilt)
         for leg, path in zip(legs, paths, strict=True)
         if read_run(CartOutcome, path, leg.told(seed, longest)) is None
     ]
@@ -153,18 +156,24 @@ def driven(legs: Sequence[Leg], seed: int, longest: float, out: Path) -> list[Ca
     return [each for each in done if each is not None]
 
 
-def drive(leg: Leg, seed: int, longest: float, path: Path) -> None:
+def drive(leg: Leg, seed: int, longest: float, path: Path, tilt: Mapping[str, Any] = TILT) -> None:
     """Drive a leg and keep it."""
-    scene = scene_of(load_office(leg.office), np.array(leg.start))
+    scene = scene_of(load_office(leg.office), np.array(leg.start), tilt)
     drawn = int(np.random.default_rng([seed, leg.number, 2]).integers(2**31))
     keep_run(path, leg.told(seed, longest), run_cart(scene, np.array(leg.goal), drawn, longest))
 
 
-def scene_of(office: OfficeScene, start: Array) -> OfficeScene:
-    """Return an office with the robot and its cart at a pose (3,) of `base`, and people of the experiment's manners."""
+def scene_of(office: OfficeScene, start: Array, told: Mapping[str, Any] = TILT) -> OfficeScene:
+    """Return an office with the robot and its cart at a pose (3,) of `base`, and people of the experiment's manners.
+
+    Args:
+        office: with robot and cart anywhere.
+        start: of `base` [m, rad].
+        told: of the tilting laser.
+    """
     cart = compose(start, np.array([AHEAD, 0.0, 0.0]))
     robot = office.robot.model_copy(update={"pose": tuple(map(float, start))})
-    tilt = office.sensors.tilt_laser.model_copy(update=TILT)
+    tilt = office.sensors.tilt_laser.model_copy(update=dict(told))
     held = office.bodies["cart"].model_copy(update={"pose": tuple(map(float, cart))})
     return office.model_copy(
         update={

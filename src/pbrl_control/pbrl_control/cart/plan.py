@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
@@ -28,6 +28,7 @@ class CartPlan:
     Attributes:
         times: (n,) [s], from 0, ascending.
         poses: (n, 4) x, y, heading of `base` in the frame of the costmap, articulation [m, rad], angles without jumps.
+        reached: (k,) when each of the poses is that it was made from [s]; empty where it was made with its times.
 
     Raises:
         ControlError: a shape or number is not what it should be.
@@ -35,6 +36,7 @@ class CartPlan:
 
     times: Array
     poses: Array
+    reached: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         times, poses = np.asarray(self.times, dtype=float), _poses(self.poses)
@@ -82,13 +84,14 @@ class CartPlan:
             raise ControlError(f"plan: expected at most {LONGEST:g} s of motion, got {ends[-1]:g} s; check its units")
         keep = np.concatenate(([True], np.diff(ends) > 1e-9))
         if keep.sum() < 2:
-            return cls(np.zeros(1), points[:1])
+            return cls(np.zeros(1), points[:1], np.zeros(len(points)))
         samples = np.linspace(0.0, ends[-1], max(int(np.ceil(ends[-1] / STEP)), 1) + 1)
         fine = np.column_stack([np.interp(samples, ends[keep], points[keep, k]) for k in range(4)])
         fine[-1] = points[-1]
         rates = np.zeros(4) if last is None else np.asarray(last, dtype=float)
         along = np.append(rotation(float(fine[0, 2])) @ rates[:2], rates[2:])
-        return cls(_times(samples, fine, share * limits.accelerations, along), fine)
+        times = _times(samples, fine, share * limits.accelerations, along)
+        return cls(times, fine, np.interp(ends, samples, times))
 
     @property
     def duration(self) -> float:

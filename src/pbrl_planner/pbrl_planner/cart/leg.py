@@ -35,7 +35,9 @@ class Order(StrEnum):
     PLAN = "ask the planner"
     CLEAR = "clear the costmaps where robot and cart are"
     FORGET = "forget what nobody has seen of late"
+    REFINE = "ask the planner for a better path from a place ahead"
     FOLLOW = "drive along the path"
+    SWITCH = "drive on to that place, and along the better path from there"
     END = "say how it ended"
 
 
@@ -64,7 +66,8 @@ class Leg:
         self.began = now
         self.state, self.sentence = LegState.PLANNING, "looking for a path"
         self.plans = self.failures = 0
-        self._asked = self._driving = self._stands = False
+        self._asked = self._driving = self._stands = self._refining = False
+        self._since = now  # on this path
         self._next, self._pause = now, settings.retry
         self._without: float | None = None
 
@@ -76,15 +79,17 @@ class Leg:
 
     def planned(self, now: float, outcome: Outcome, message: str) -> Order:
         """Take in the planner's answer."""
-        self._asked = False
+        refining, self._asked, self._refining = self._refining, False, False
         if self.state in ENDED:
             return Order.NOTHING
         self.plans += 1
+        if refining:
+            return self._refined(now, outcome)
         if outcome is Outcome.FOUND:
             self._next, self._pause = now + self._settings.retry, self._settings.retry
             if self._driving and not self._stands:  # who was in the way is gone, and the path begins behind the robot
                 return Order.NOTHING
-            self._without, self._driving, self._stands = None, True, False
+            self._without, self._driving, self._stands, self._since = None, True, False, now
             return self._say(LegState.DRIVING, message, Order.FOLLOW)
         self.failures += 1
         self._next, self._pause = now + self._pause, min(2.0 * self._pause, self._settings.retry_most)
@@ -107,9 +112,26 @@ class Leg:
             return Order.NOTHING
         self._stands = blocked > 0.0
         self.sentence = reason if reason and self._stands else "on the way"
-        if blocked < self._settings.blocked or self._asked or now < self._next:
+        if self._asked or now < self._next:
             return Order.NOTHING
-        return self._ask()
+        if blocked >= self._settings.blocked:
+            return self._ask()
+        if self._stands or now - self._since < self._settings.refresh:
+            return Order.NOTHING
+        self._refining = self._asked = True
+        return Order.REFINE
+
+    def _refined(self, now: float, outcome: Outcome) -> Order:
+        """Switch to what was found ahead; where nothing was, the path that is driven is as good as before."""
+        self._since = now
+        if outcome is not Outcome.FOUND:
+            self.failures += 1
+        return Order.SWITCH if self._driving and outcome is Outcome.FOUND else Order.NOTHING
+
+    def nothing_ahead(self, now: float) -> None:
+        """Take in that no better path can be asked for: too little is left of the one that is driven."""
+        self._asked = self._refining = False
+        self._since = now
 
     def drove(self, ended: Drove, message: str) -> Order:
         """Take in how the drive ended; not for one whose place another path has taken."""

@@ -19,6 +19,8 @@ class NavigationSettings(Section):
         retry: [s] between two calls of the planner of which the first found nothing; twice as long after each more.
         retry_most: [s] between two calls at most.
         unseen: [s] after which something that nobody has seen since is taken to be gone, where it leaves no path.
+        refresh: [s] on one path after which a better one is looked for, from a place ahead on it: the floor is better
+            known by then.
         give_up: [s] without a path after which the goal is given up: people leave, walls do not.
     """
 
@@ -26,6 +28,7 @@ class NavigationSettings(Section):
     retry: Positive = 2.0
     retry_most: Positive = 6.0
     unseen: Positive = 5.0
+    refresh: Positive = 15.0
     give_up: Positive = 120.0
 
 

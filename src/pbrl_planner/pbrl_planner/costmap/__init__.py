@@ -4,7 +4,7 @@ from pbrl_planner.costmap.costmap import Costmap, Recovery, ScanReport
 from pbrl_planner.costmap.field import FREE, INSCRIBED, LETHAL, UNKNOWN, CostField
 from pbrl_planner.costmap.inflation import inflate, squared_distances
 from pbrl_planner.costmap.scan import RangeScan
-from pbrl_planner.costmap.settings import CostmapSettings, EvidenceSettings, InflationSettings
+from pbrl_planner.costmap.settings import CostmapSettings, EvidenceSettings, InflationSettings, OverhangSettings
 from pbrl_planner.costmap.static_map import StaticMap
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "CostmapSettings",
     "EvidenceSettings",
     "InflationSettings",
+    "OverhangSettings",
     "RangeScan",
     "Recovery",
     "ScanReport",

@@ -16,11 +16,14 @@ from pbrl_control.planar import Array
 from pbrl_planner.costmap import ray_kernel as kernel
 from pbrl_planner.costmap.field import CostField
 from pbrl_planner.costmap.inflation import inflate
+from pbrl_planner.costmap.overhang import Overhang
+from pbrl_planner.costmap.rolling import roll
 from pbrl_planner.costmap.scan import RangeScan
 from pbrl_planner.costmap.settings import CostmapSettings
 from pbrl_planner.costmap.static_map import StaticMap
 from pbrl_planner.errors import PlannerError
 
+Mask = NDArray[np.bool_]
 FARTHEST = 1e6  # [m] from the frame's origin
 ALIGNED = 1e-9  # of a cell: rounding at a border must not roll the window to and fro
 
@@ -88,6 +91,7 @@ class Costmap:
         self._last = np.full(shape, -np.inf)
         self._corner = self._corner_for(centre)
         self._known: NDArray[np.int8] | None = None
+        self._overhang: Overhang | None = None  # voxels are for those who have a laser that nods
 
     @classmethod
     def over(cls, static: StaticMap, settings: CostmapSettings | None = None) -> Self:
@@ -143,7 +147,9 @@ class Costmap:
             return
         self._corner, self._known = corner, None
         for layer, blank in ((self._evidence, 0), (self._looked, 0), (self._last, -np.inf)):
-            _roll(layer, dy, dx, blank)
+            roll(layer, dy, dx, blank)
+        if self._overhang is not None:
+            self._overhang.roll(dy, dx)
 
     def place_map(self, map_pose: Array | Sequence[float]) -> None:
         """Say where `map` is: pose (3,) in the costmap's frame; at the start it is that frame.
@@ -197,6 +203,27 @@ class Costmap:
         self.time = max(self.time, scan.time)
         return ScanReport(occupied, freed, mine)
 
+    def observe_nodding(self, scan: RangeScan, laser: Array, own: Sequence[Array] = ()) -> ScanReport:
+        """Take in a scan of a laser that nods: what it sees over the floor is in the way as well.
+
+        Such scans come seldom to any one place: `time`, by which a costmap gets stale, is that of the level laser.
+
+        Args:
+            scan: of a laser that leans any way.
+            laser: (4, 4) pose of its frame in the costmap's, the floor at height 0.
+            own: as in `observe`.
+
+        Raises:
+            PlannerError: the pose is not finite, or too far away; an outline is not what it should be.
+        """
+        pose = np.asarray(laser, dtype=float)
+        if pose.shape != (4, 4) or not np.isfinite(pose).all() or np.abs(pose[:3, 3]).max() > FARTHEST:
+            raise PlannerError(f"costmap: expected a pose (4, 4) within {FARTHEST:g} m of a laser, got {laser}")
+        settings = self.settings
+        if self._overhang is None:
+            self._overhang = Overhang(settings.overhang, settings.shape, settings.resolution)
+        return ScanReport(*self._overhang.observe(scan, pose, _packed(own), settings.own_margin, self.origin))
+
     def field(self, now: float) -> CostField:
         """Return the costs as of `now` [s]; obstacles that nobody has seen for too long are forgotten first."""
         evidence = self.settings.evidence
@@ -204,6 +231,8 @@ class Costmap:
             now, evidence.confirmed, evidence.fleeting, evidence.memory, self._evidence, self._looked, self._last
         )
         lethal, unknown = self._evidence > 0, self._looked == 0
+        if self._overhang is not None:
+            lethal |= self._overhang.occupied(now)
         known = self._from_map()
         if known is not None:
             lethal |= known == 1
@@ -229,12 +258,14 @@ class Costmap:
         inside = np.zeros(self.settings.shape, dtype=np.uint8)
         half = self.settings.resolution * math.sqrt(0.5)
         kernel.cells_near(corners, first, half, self.settings.resolution, *self.origin, inside)
-        return self._take_out(inside == 1, "cleared what was marked where robot and cart are")
+        where = inside == 1
+        return self._take_out(where, where, "cleared what was marked where robot and cart are")
 
     def clear_unconfirmed(self) -> Recovery:
         """Take out all that was seen too seldom to be sure of it, wherever it is (thesis 4.6: spurious readings)."""
         doubtful = self._evidence < self.settings.evidence.confirmed
-        return self._take_out(doubtful, f"cleared obstacles with evidence below {self.settings.evidence.confirmed}")
+        above = None if self._overhang is None else ~self._overhang.settled()
+        return self._take_out(doubtful, above, "cleared obstacles that were seen too seldom to be sure of them")
 
     def clear_unseen(self, now: float, age: float) -> Recovery:
         """Take out what nobody has seen for so long [s]: who stood in the shadow of the cart may have gone.
@@ -244,17 +275,23 @@ class Costmap:
         """
         if not (math.isfinite(now) and math.isfinite(age)):
             raise PlannerError(f"costmap: expected a finite time and age, got {now} and {age} s")
-        return self._take_out(now - self._last > age, f"cleared obstacles that nobody has seen for {age:g} s")
+        above = None if self._overhang is None else self._overhang.unseen(now, age)
+        return self._take_out(now - self._last > age, above, f"cleared obstacles that nobody has seen for {age:g} s")
 
-    def _take_out(self, where: NDArray[np.bool_], what: str) -> Recovery:
-        gone = where & (self._evidence > 0)
+    def _take_out(self, where: Mask, above: Mask | None, what: str) -> Recovery:
+        """Take out what is marked on the floor in some cells, and over it in others."""
+        strength = np.where(where, self._evidence, 0).astype(np.int64)
+        self._evidence[where] = 0
+        if self._overhang is not None and above is not None:
+            over = self._overhang.strength()
+            strength = np.maximum(strength, np.where(above, over, 0))
+            self._overhang.clear(above)
+        gone = strength > 0
         rows, columns = np.nonzero(gone)
         places: Array = (np.column_stack((columns, rows)) + 0.5) * self.settings.resolution + np.array(self.origin)
-        spoke = self._evidence[gone].astype(np.int64)
-        self._evidence[gone] = 0
         known = self._from_map()
         left = 0 if known is None else int(np.count_nonzero(where & (known == 1)))
-        return Recovery(what, places, spoke, left)
+        return Recovery(what, places, strength[gone], left)
 
     def _from_map(self) -> NDArray[np.int8] | None:
         if self._static is not None and self._known is None:
@@ -285,14 +322,3 @@ def _packed(outlines: Sequence[Array]) -> tuple[Array, NDArray[np.int64]]:
         raise PlannerError(str(error)) from error
     first = np.cumsum([0, *(len(ring) for ring in rings)]).astype(np.int64)
     return np.ascontiguousarray(np.concatenate([*rings, np.zeros((0, 2))])), first
-
-
-def _roll(layer: NDArray, rows: int, columns: int, blank: float) -> None:
-    """Move a layer's content by so many cells towards its corner, in place."""
-    moved = np.full_like(layer, blank)
-    height, width = layer.shape
-    if abs(rows) < height and abs(columns) < width:
-        to = slice(max(-rows, 0), height - max(rows, 0)), slice(max(-columns, 0), width - max(columns, 0))
-        source = slice(max(rows, 0), height + min(rows, 0)), slice(max(columns, 0), width + min(columns, 0))
-        moved[to] = layer[source]
-    layer[:] = moved

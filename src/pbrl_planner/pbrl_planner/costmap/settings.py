@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from pbrl_control.settings import NotNegative, Positive, Section
 
 MOST_CELLS = 16_000_000
+MOST_LEVELS = 60
 
 
 class InflationSettings(Section):
@@ -59,6 +60,63 @@ class EvidenceSettings(Section):
         return self
 
 
+class OverhangSettings(Section):
+    """What a laser that nods sees over the floor, in columns of voxels as wide as a cell.
+
+    Attributes:
+        lowest: [m] over the floor from which something is in the way of robot or cart.
+        highest: [m] up to which it is.
+        level: height of a voxel [m].
+        graze: [m] by which a beam has to be lower than the highest mark in a voxel to speak against it.
+        mark_range: [m] along a beam up to which what it ends at is marked.
+        clear_range: [m] up to which it frees what it passes.
+        hit: evidence that a scan adds which ends in a voxel; it is occupied while its evidence is above zero.
+        miss: evidence that a scan takes which sees through it.
+        most: evidence at most.
+        patch: [m] side of a patch of the floor, over which it is asked whether something has settled. A nod takes
+            seconds, and the next one hits the same thing elsewhere: no voxel is seen often.
+        settled: [s] between the first and the last mark over a patch from which it is taken for real: furniture stays,
+            who walks has gone on.
+        fleeting: [s] that marks stay over a patch where nothing has settled, and nobody looks any more.
+        memory: [s] that they do where something has.
+    """
+
+    lowest: Annotated[NotNegative, Field(le=10.0)] = 0.10
+    highest: Annotated[Positive, Field(le=10.0)] = 1.70
+    level: Annotated[Positive, Field(ge=0.02, le=1.0)] = 0.10
+    graze: Annotated[NotNegative, Field(le=0.2)] = 0.03
+    mark_range: Annotated[Positive, Field(le=100.0)] = 4.0
+    clear_range: Annotated[Positive, Field(le=100.0)] = 5.0
+    hit: Annotated[int, Field(ge=1, le=100)] = 2
+    miss: Annotated[int, Field(ge=1, le=100)] = 1
+    most: Annotated[int, Field(ge=1, le=250)] = 6
+    patch: Annotated[Positive, Field(ge=0.02, le=2.0)] = 0.20
+    settled: Positive = 1.5
+    fleeting: Positive = 5.0
+    memory: Positive = 60.0
+
+    @model_validator(mode="after")
+    def _stacks(self) -> Self:
+        if self.hit > self.most:
+            raise ValueError(f"expected hit at most {self.most}, got {self.hit}")
+        if not self.settled <= self.fleeting <= self.memory:
+            raise ValueError(
+                f"expected settled at most fleeting, and that at most memory, got {self.settled}, {self.fleeting} and "
+                f"{self.memory} s"
+            )
+        if not 1 <= self.levels <= MOST_LEVELS:
+            raise ValueError(
+                f"expected highest above lowest by 1 to {MOST_LEVELS} levels of {self.level:g} m, got {self.lowest:g} "
+                f"to {self.highest:g} m"
+            )
+        return self
+
+    @property
+    def levels(self) -> int:
+        """Voxels of a column."""
+        return round((self.highest - self.lowest) / self.level)
+
+
 class CostmapSettings(Section):
     """Everything a costmap can be told.
 
@@ -71,6 +129,9 @@ class CostmapSettings(Section):
         own_margin: [m] about the outlines of robot and cart in which readings are taken for their own.
         unknown: what becomes of cells that nobody saw: cost 255, 0 or 254.
         stale: [s] after the last scan at which the costmap is not to be relied upon.
+        inflation: how cost falls off from obstacles.
+        evidence: what is believed of a cell.
+        overhang: what is believed of what a nodding laser sees.
     """
 
     resolution: Annotated[Positive, Field(ge=0.005, le=1.0)] = 0.025
@@ -83,6 +144,7 @@ class CostmapSettings(Section):
     stale: Positive = 0.15
     inflation: InflationSettings = InflationSettings()
     evidence: EvidenceSettings = EvidenceSettings()
+    overhang: OverhangSettings = OverhangSettings()
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

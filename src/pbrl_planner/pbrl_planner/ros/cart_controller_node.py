@@ -229,13 +229,15 @@ class CartControllerNode(Node):
         self._goals.tell(self._feedback(now, command))
 
     def _feedback(self, now: float, command: CartCommand) -> FollowCartPath.Feedback:
-        error = np.where(np.isfinite(command.error), command.error, 0.0)
+        assert self._plan is not None, "called under way"
+        error, remaining = np.where(np.isfinite(command.error), command.error, 0.0), self._remaining(command.goal)
         return FollowCartPath.Feedback(
             status=str(command.status),
             reason=command.reason,
             pace=float(command.pace),
             blocked=0.0 if self._blocked is None else now - self._blocked,
-            remaining=self._remaining(command.goal),
+            remaining=remaining,
+            passed=int(np.searchsorted(self._plan.reached, self._at, side="right")),
             position_error=math.hypot(*error[:2]),
             angle_error=float(np.abs(error[2:]).max()),
         )

@@ -1,7 +1,8 @@
 """Brings robot and cart to a goal: from RViz on /goal_pose, or by the action /navigate_cart; the last one counts.
 
 It asks /plan_cart_path, hands the path to /follow_cart_path, and asks again where something stays in the way, a path
-was given up, or there was none: people leave. /cart_navigator/status (std_msgs/String) says where it is.
+was given up, or there was none: people leave. While it drives it looks for a better path, from a place ahead on the one
+that is driven. /cart_navigator/status (std_msgs/String) says where it is.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ from std_srvs.srv import Trigger
 
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import refuse_unknown
+from pbrl_control.planar import Array
 from pbrl_control.ros.qos import COMMANDS
+from pbrl_planner.cart.ahead import join_ahead, joined
 from pbrl_planner.cart.leg import ENDED, Drove, Leg, LegState, Order
 from pbrl_planner.cart.query import Outcome
 from pbrl_planner.errors import PlannerError
-from pbrl_planner.ros.conversions import pose_in_map
+from pbrl_planner.ros.conversions import MAP, path_from_msg, path_to_msg, pose_in_map, pose_to_msg
 from pbrl_planner.ros.one_goal import OneGoal
 from pbrl_planner.ros.running import declare_settings, run_node
 from pbrl_planner.ros.saying import Saying
@@ -37,10 +40,19 @@ ENDS = {getattr(FollowCartPath.Result, each.name): each for each in Drove}
 
 @dataclass
 class _Drive:
-    """A path that is driven: the action's handle, once it is accepted, and whether it still is wanted."""
+    """A path that is driven.
 
+    Attributes:
+        poses: (n, 4) of it [m, rad].
+        handle: the action's, once it is accepted.
+        wanted: whether it still is.
+        passed: how many of its poses lie behind.
+    """
+
+    poses: Array
     handle: Any = None
     wanted: bool = True
+    passed: int = 0
 
     def stop(self) -> None:
         self.wanted = False
@@ -53,7 +65,10 @@ class CartNavigatorNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("cart_navigator_node", **options)
-        self._settings = declare_settings(self).navigation
+        told = declare_settings(self)
+        self._settings, self._limits = told.navigation, told.controller.limits
+        # A better path is there by then, and what takes it on has a moment more.
+        self._lead, self._join = told.planner.time_limit + 1.0, 0
         refuse_unknown(self)
         self._goal: PoseStamped | None = None
         self._leg: Leg | None = None
@@ -167,6 +182,10 @@ class CartNavigatorNode(Node):
             self._ask()
         elif order is Order.FOLLOW:
             self._follow(path)
+        elif order is Order.REFINE:
+            self._ask_ahead()
+        elif order is Order.SWITCH:
+            self._switch(path)
         elif order in self._mend:
             self._mend_costmaps(order)
         elif order is Order.END:
@@ -174,14 +193,39 @@ class CartNavigatorNode(Node):
 
     # The planner
 
-    def _ask(self) -> None:
+    def _ask_ahead(self) -> None:
+        """Ask for a path from a place ahead; where there is none, the one that is driven will do to its end."""
+        leg, drive = self._leg, self._drive
+        assert leg is not None
+        join = None if drive is None else join_ahead(drive.poses, drive.passed, self._lead, self._limits)
+        if drive is None or join is None:
+            leg.nothing_ahead(self._now())
+            return
+        self._join = join
+        begin = PoseStamped(pose=pose_to_msg(drive.poses[join, :3]))
+        begin.header.frame_id = MAP
+        self._ask(PlanCartPath.Goal(use_start=True, start=begin, start_articulation=float(drive.poses[join, 3])))
+
+    def _switch(self, path: Any) -> None:
+        """Drive on to where the better path begins, and along it from there; if that is not behind by now."""
+        if self._drive is None:
+            return
+        try:
+            found = joined(self._drive.poses, self._drive.passed, self._join, path_from_msg(path))
+        except PlannerError as error:
+            self.get_logger().warning(f"a better path was left aside: {error}")
+            return
+        if found is not None:
+            self._follow(path_to_msg(found, self._now()))
+
+    def _ask(self, question: PlanCartPath.Goal | None = None) -> None:
         assert self._goal is not None and self._leg is not None
+        question = question or PlanCartPath.Goal()
+        question.goal = self._goal
         if not self._planner.server_is_ready():
             self._do(self._leg.planned(self._now(), Outcome.NOT_READY, NO_PLANNER))
             return
-        sent = self._planner.send_goal_async(
-            PlanCartPath.Goal(goal=self._goal), feedback_callback=partial(self._on_better, self._number)
-        )
+        sent = self._planner.send_goal_async(question, feedback_callback=partial(self._on_better, self._number))
         sent.add_done_callback(partial(self._on_asked, self._number))
 
     def _on_better(self, number: int, message: Any) -> None:
@@ -207,7 +251,11 @@ class CartNavigatorNode(Node):
             self._do(self._leg.drove(Drove.REFUSED, NO_CONTROLLER))
             return
         # Of another path that is driven nothing more is wanted: the controller lets this one take its place.
-        drive = self._drive = _Drive()
+        try:
+            drive = self._drive = _Drive(path_from_msg(path))
+        except PlannerError as error:
+            self._do(self._leg.drove(Drove.REFUSED, f"the planner's path: {error}"))
+            return
         sent = self._driver.send_goal_async(
             FollowCartPath.Goal(path=path), feedback_callback=partial(self._on_driving, drive)
         )
@@ -225,7 +273,7 @@ class CartNavigatorNode(Node):
         if drive is not self._drive or self._leg is None:
             return
         feedback = message.feedback
-        self._remaining = float(feedback.remaining)
+        self._remaining, drive.passed = float(feedback.remaining), int(feedback.passed)
         self._do(self._leg.driving(self._now(), float(feedback.blocked), feedback.reason))
 
     def _on_drove(self, drive: _Drive, future: Future) -> None:

@@ -2,13 +2,15 @@
 
 The local costmap lies around the robot and comes with every scan; the global one covers the map and comes at `rate`.
 Both are in `map`, and stamped with the time of the last scan in them: when the laser is silent, they get old, and
-whoever drives by them stops. What lasers see of robot and cart is left out. The service /costmaps/clear takes out what
+whoever drives by them stops. /tilt_scan is of a laser that nods, and sees what hangs over the floor; without one, the
+level laser is all there is. What lasers see of robot and cart is left out. The service /costmaps/clear takes out what
 is marked where robot and cart are, and what was seen too seldom; /costmaps/forget_unseen what nobody has seen of late.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Any
 
 from nav_msgs.msg import OccupancyGrid
@@ -20,17 +22,20 @@ from tf2_msgs.msg import TFMessage
 
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
-from pbrl_control.planar import Array, compose
+from pbrl_control.planar import Array, compose, on_floor
 from pbrl_control.ros.qos import LATCHED, NEWEST
 from pbrl_planner.cart.shoulders import with_shoulders
 from pbrl_planner.cart.tracker import CartTracker
 from pbrl_planner.costmap import CostField, Costmap, Recovery, StaticMap
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.ros.conversions import field_to_msg, map_from_msg, scan_from_msg
-from pbrl_planner.ros.frames import Frames
+from pbrl_planner.ros.frames import Frames, NotYetError
 from pbrl_planner.ros.hearing import BASE, SAID, Hearing
 from pbrl_planner.ros.running import declare_settings, run_node
 
+WAITING = 5
+"""Scans of the nodding laser that wait at most for /tf to say how it stood."""
+MOVING = QoSProfile(depth=100)
 STATIC = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -48,6 +53,7 @@ class CostmapNode(Node):
         refuse_unknown(self)
         self.tracker, self._frames = CartTracker(), Frames()
         self._static: StaticMap | None = None
+        self._nods: deque[LaserScan] = deque(maxlen=WAITING)
         self._left_aside = ""
         self._local = Costmap(self._settings.local_costmap)
         self._global: Costmap | None = None
@@ -58,6 +64,8 @@ class CostmapNode(Node):
         diagnostics.subscribe(TFMessage, "/tf_static", self._frames.hear, STATIC)
         diagnostics.subscribe(OccupancyGrid, "map", self._on_map, LATCHED)
         diagnostics.subscribe(LaserScan, "scan", self._on_scan, NEWEST)
+        diagnostics.subscribe(TFMessage, "/tf", self._on_frames, MOVING, needed=False)
+        diagnostics.subscribe(LaserScan, "tilt_scan", self._on_nod, NEWEST, needed=False)
         self.create_service(Trigger, "costmaps/clear", self._clear)
         self.create_service(Trigger, "costmaps/forget_unseen", self._forget_unseen)
         self.create_timer(1.0 / rate, self._tell_global)
@@ -96,6 +104,28 @@ class CostmapNode(Node):
             return
         self._left_aside = ""
         self._local_out.publish(field_to_msg(self._field(self._local, scan.time, own)))
+
+    def _on_frames(self, message: TFMessage) -> None:
+        self._frames.hear_moving(message)
+        waiting, self._nods = list(self._nods), deque(maxlen=WAITING)
+        for scan in waiting:
+            self._on_nod(scan)
+
+    def _on_nod(self, message: LaserScan) -> None:
+        """Take in a scan of the laser that nods, as soon as it is known how it and the robot stood."""
+        try:
+            scan = scan_from_msg(message)
+            pose = self.tracker.pose(scan.time)
+            if pose is None:
+                raise PlannerError(f"/tilt_scan: expected to know where the robot is; waiting for {self._wanting()}")
+            laser = on_floor(pose) @ self._frames.pose(message.header.frame_id, BASE, scan.time)
+            own = self.tracker.own(scan.time)
+            for costs in self._maps():
+                costs.observe_nodding(scan, laser, own)
+        except NotYetError:
+            self._nods.append(message)
+        except PlannerError as error:
+            self.get_logger().warning(f"left aside: {error}", throttle_duration_sec=SAID)
 
     def _wanting(self) -> str:
         return self.tracker.missing or "odometry as old as the scan"
