@@ -163,8 +163,7 @@ def test_what_hangs_over_the_floor_is_marked_once_it_is_known_how_the_laser_stoo
     assert not sees((-0.02, 0.3)), "/tf has not come that far"
     mapping.stage.until(lambda: sees((-0.02, 0.3), (0.02, 0.5)))
     before = len(mapping.whole)
-    mapping.stage.tick(0.6)
-    mapping.stage.until(lambda: len(mapping.whole) > before)
+    mapping.stage.until(lambda: mapping.look(aside=np.inf) and len(mapping.whole) > before)
     assert field_from_msg(mapping.whole[-1]).cost(*place) == LETHAL
 
 
