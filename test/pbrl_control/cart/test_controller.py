@@ -152,6 +152,26 @@ def test_it_stops_before_what_appears_ahead_and_goes_on_when_that_is_gone(name: 
     assert ticks[-1].command.status is DriveStatus.ARRIVED
 
 
+def test_it_keeps_its_distance_however_often_it_sets_out_anew_before_something_that_flickers(
+    rng: np.random.Generator,
+) -> None:
+    """A laser is off by a cell or two, and whoever waits for the way to get free plans from rest again and again."""
+    wall = 0.65 + 0.9 + 0.3  # 0.3 m ahead of the cart
+    state = np.zeros(4)
+
+    def floor(now: float) -> Costs:
+        near = wall + rng.uniform(0.0, 0.04)
+        return FLOOR.with_box(near, -0.1, near + 0.2, 0.1)
+
+    for _ in range(12):
+        left = straight(2.0)
+        left[:, 0] += state[0]
+        controller, world = made(left)
+        state = drive(controller, world, floor, 3.0)[-1].state
+    gap = wall - (state[0] + 0.65 + 0.9)
+    assert SETTINGS.keep - 0.03 < gap < SETTINGS.keep + 0.08, "it goes near, and not nearer"
+
+
 def test_what_appears_at_the_braking_distance_is_not_touched() -> None:
     settings, limits = SETTINGS, SETTINGS.limits
     controller, world = made(straight(3.0), noise=np.zeros(4))

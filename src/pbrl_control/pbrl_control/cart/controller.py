@@ -153,9 +153,8 @@ class CartController:
             share = (ahead.clearance - settings.margin) / max(settings.near - settings.margin, 1e-9)
             found.append((settings.near_share + (1.0 - settings.near_share) * max(share, 0.0), Cause.NEAR))
         if math.isfinite(ahead.free):
-            left = ahead.free - settings.reserve
             most = np.maximum(ahead.rates, rates) / (COMFORT * self._limits.brakings)
-            found.append((math.sqrt(2.0 * max(left, 0.0) / max(float(most.max()), 1e-3)), Cause.OBSTACLE))
+            found.append((math.sqrt(2.0 * max(ahead.stop, 0.0) / max(float(most.max()), 1e-3)), Cause.OBSTACLE))
         pace, cause = min(found, key=lambda each: each[0])
         return min(max(pace, 0.0), 1.0), cause
 

@@ -29,11 +29,13 @@ class Ahead:
 
     Attributes:
         free: [s] of the plan from now until something would be touched; infinite: as far as was looked.
+        stop: [s] of it until so near to that as `keep` allows.
         clearance: least distance to something lethal soon [m], at most `near`.
         rates: (3,) greatest of translation, turning and articulation on the way [m/s, rad/s].
     """
 
     free: float
+    stop: float
     clearance: float
     rates: Array
 
@@ -68,7 +70,7 @@ class Guard:
         times = time + np.linspace(0.0, max(span, 0.0), FEWEST)
         poses = plan.at(times)
         moved = np.abs(np.diff(poses, axis=0))
-        corners = np.hypot(moved[:, 0], moved[:, 1]) + self._reach[0] * moved[:, 2] + self._reach[1] * moved[:, 3]
+        corners = self._corners(poses)
         # Even in time: the fastest part of the way decides.
         count = math.ceil((FEWEST - 1) * float(corners.max()) / (FINE * costs.resolution)) + 1
         if count > FEWEST:
@@ -76,11 +78,22 @@ class Guard:
             poses = plan.at(times)
         found = np.empty(len(poses))
         blocked = self._clearance(poses, max(settings.near, settings.margin), costs, found)
-        free = float(times[blocked] - time) if blocked < len(poses) else np.inf
+        free = stop = np.inf
+        if blocked < len(poses):
+            way = np.concatenate(([0.0], np.cumsum(self._corners(poses[: blocked + 1]))))
+            free = float(times[blocked] - time)
+            stop = float(np.interp(way[-1] - settings.keep, way, times[: blocked + 1])) - time
         soon = found[times <= time + SOON * settings.look_ahead]
         lengths = np.column_stack((np.hypot(moved[:, 0], moved[:, 1]), moved[:, 2:]))
         rates = lengths.max(axis=0) * ((FEWEST - 1) / span) if span > 0.0 else np.zeros(3)
-        return Ahead(free, float(soon.min()), rates)
+        return Ahead(free, stop, float(soon.min()), rates)
+
+    def _corners(self, poses: Array) -> Array:
+        """Return how far any corner goes at most between poses (n, 4), (n - 1,) [m]."""
+        moved = np.abs(np.diff(poses, axis=0))
+        return np.asarray(
+            np.hypot(moved[:, 0], moved[:, 1]) + self._reach[0] * moved[:, 2] + self._reach[1] * moved[:, 3]
+        )
 
     def verdict(self, here: Array, rates: Array, costs: CostWindow) -> Verdict:
         """Say whether a command can be given and then braked from.

@@ -98,7 +98,8 @@ class CartSettings(Section):
         near_share: of its speed that is left where something is almost touched.
         margin: distance that counts as touching [m]; not more than what the planner keeps, or its plans are refused.
         look_ahead: [s] of the plan that has to be free.
-        reserve: [s] of the plan kept from what is in the way.
+        keep: [m] kept from what is in the way: so far some corner would still go before something is touched. Whoever
+            stands there needs room to turn round.
         unknown_blocks: whether cells that nobody saw are not to be entered, those outside of the costmap among them.
         stop_within: time after the last scan in which the robot stands, whatever its speed [s].
         scan_age: of the last scan at which the robot waits [s].
@@ -126,7 +127,7 @@ class CartSettings(Section):
     near_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.4
     margin: Annotated[NotNegative, Field(le=0.3)] = 0.0
     look_ahead: Annotated[Positive, Field(le=5.0)] = 1.0
-    reserve: Annotated[NotNegative, Field(le=1.0)] = 0.15
+    keep: Annotated[NotNegative, Field(le=1.0)] = 0.12
     unknown_blocks: bool = False
     stop_within: Positive = 0.3
     scan_age: Positive = 0.15
