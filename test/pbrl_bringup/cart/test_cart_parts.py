@@ -11,7 +11,8 @@ import pytest
 from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
 from pbrl_bringup.cart_run import AHEAD, CartRun, onward, rest
 from pbrl_bringup.errors import BringupError
-from pbrl_bringup.experiments.cart_office import route, rows_of
+from pbrl_bringup.experiments import cart_desks
+from pbrl_bringup.experiments.cart_office import TILT, leg_of, route, rows_of, scene_of
 from pbrl_bringup.experiments.kept import keep_run, read_run
 from pbrl_control.cart import CartBody, CartCommand, Cause, DriveStatus
 from pbrl_control.cart.whereabouts import Whereabouts
@@ -22,6 +23,8 @@ from pbrl_planner.cart.settings import load_cart
 from pbrl_planner.cart.shoulders import BEYOND, with_shoulders
 from pbrl_planner.costmap import LETHAL, CostField, Recovery, StaticMap
 from pbrl_planner.lattice import Lattice, LatticePlan, LatticeProblem, plan
+from pr2_cart_sim.scene import load_office
+from pr2_cart_sim.sensor_settings import TiltLaserSettings
 
 
 @pytest.fixture
@@ -174,6 +177,19 @@ def leg(*calls: PlannerCall, contacts: tuple[Touch, ...] = ()) -> CartOutcome:
     score = Score(contacts, 0.4, None, (0.01, 0.02), (0.01, 0.0), (1e-3, 2e-3), 0.02, 0.01, 5.0)
     trace = (Trace(0.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "on the way", "", {"a": (1.0, 2.0)}),)
     return CartOutcome(True, "at the goal", 20.0, calls, trace, score, (1.0, 0.0, 0.0), ((0.0, 0.0),), ())
+
+
+def test_desks_on_the_walls_are_what_the_two_drives_of_each_leg_differ_in(tmp_path) -> None:
+    legs = [leg_of(3, number, tmp_path, cart_desks.OFFICE) for number in range(2)]
+    office = load_office(legs[0].office)
+    hung = [name for name, body in office.clutter.items() if body.kind == "fixture" and body.underside > 0.6]
+    assert len(hung) >= 4 and not office.people and legs[1].start == pytest.approx(legs[0].goal)
+    scenes = [scene_of(office, np.array(legs[0].start), tilt) for tilt in (TILT, cart_desks.BLIND)]
+    lasers = [TiltLaserSettings(**scene.sensors.tilt_laser.model_dump()) for scene in scenes]
+    assert lasers[0].beams > 30 and lasers[0].range_max == 30.0
+    assert lasers[1].range_max < 0.4, "it sees no further than the robot reaches itself"
+    changes = {"tilt_laser": scenes[0].sensors.tilt_laser}
+    assert scenes[1].model_copy(update={"sensors": scenes[1].sensors.model_copy(update=changes)}) == scenes[0]
 
 
 def test_rows_tell_proved_failures_from_others() -> None:
