@@ -23,6 +23,9 @@ BELIEVED = frozenset({"mass", "inertia_factor", "delay", "sensor_turn", "com_x",
 """Columns of a baseline of which something is known beforehand."""
 SHARE = 1e-2
 """Of a prior's spread: friction is solved for only so exactly, and a finite difference must be well above that."""
+OF_A_WHEEL = 0.03, 2.0
+"""Friction along an axis of a wheel over the body's weight, and the spread of its logarithm: from 0.0005, a good
+bearing under a quarter of the load, to 0.5, rubber that slides under most of it."""
 SMALL = {"m": 0.005, "s": 0.02, "rad": 0.01}
 """Finite differences at most: borders, edges in time and axes are no softer."""
 
@@ -159,13 +162,16 @@ def baselines(
             parameters += [
                 Parameter("wheel_x", float(centroid[0]), 0.8 * float(half[0])),
                 Parameter("wheel_y", float(centroid[1]), 0.8 * float(half[1])),
-                Parameter("mu_x", 0.1, 1.0, positive=True),
             ]
         if "wheel" in parts:
+            # Which of its two axes is the one that it rolls along is not known beforehand.
             parameters += [
+                Parameter("mu_x", *OF_A_WHEEL, positive=True),
                 Parameter("wheel_theta", 0.0, 1.0),
-                Parameter("mu_y", 0.1, 1.0, positive=True),
+                Parameter("mu_y", *OF_A_WHEEL, positive=True),
             ]
+        elif "caster" in parts:
+            parameters.append(Parameter("mu_x", 0.1, 1.0, positive=True))
         if "ground" in parts:
             parameters.append(Parameter("mu_ground", 0.03, 1.0, positive=True))
         if "hinge" in parts and hinge is not None:

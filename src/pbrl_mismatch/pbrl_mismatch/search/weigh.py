@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.fitted import Fitted
 
@@ -45,8 +47,9 @@ class Weighed:
 def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOptions) -> tuple[Weighed, ...]:
     """Return the effects that were tried and the baseline, likeliest first.
 
-    The prior gives nothing-left-out `none_odds` times what all single effects share. An effect's variants, and the
-    kinds of baseline under it, share its part.
+    The prior gives nothing-left-out `none_odds` times what all single effects share. An effect's variants share its
+    part, also those that were given up on the way: an effect of many laws is no likelier for having had a bad one fewer
+    left. So do the kinds of baseline that are left under it.
 
     Args:
         bases: kinds of baseline, fitted.
@@ -63,7 +66,7 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
         evidence = np.array([member.evidence for member in members])
         finite = np.where(np.isfinite(evidence), evidence, -np.inf)
         prior = math.log(options.none_odds) if not key else -len(key) * math.log(singles)
-        weight = prior + float(np.logaddexp.reduce(finite)) - math.log(len(members))
+        weight = prior + _averaged(members, finite)
         if len(key) > 1:
             # A law that is a little wrong leaves a share of what it explains, which any other effect may take.
             parts = [set(other) for other in groups if other and set(other) < set(key)]
@@ -73,6 +76,18 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
             weight -= share * max(max(known, default=none) - none, 0.0)
         entries.append(Weighed(key, members[int(np.argmax(finite))], weight, 0.0, False))
     return _ordered(entries)
+
+
+def _averaged(members: Sequence[Fitted], evidence: NDArray[np.float64]) -> float:
+    """Return the log of the mean evidence over kinds of baseline and variants of all effects [nat]."""
+    best: dict[tuple[str, ...], float] = {}
+    for member, value in zip(members, evidence, strict=True):
+        kind, *parts = member.hypothesis.variant.split(" + ")
+        # Two effects are the same two in either order.
+        laws = (kind, *sorted(parts))
+        best[laws] = max(best.get(laws, -math.inf), float(value))
+    variants = math.prod(len(EFFECTS[name].variants) for name in members[0].hypothesis.effects)
+    return float(np.logaddexp.reduce(list(best.values()))) - math.log(variants * len({laws[0] for laws in best}))
 
 
 def worth_of_another(weighed: Sequence[Weighed]) -> float:
