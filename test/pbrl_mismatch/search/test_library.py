@@ -12,7 +12,7 @@ from pbrl_bag.types import Recording
 from pbrl_mismatch import DiagnoseOptions, track_of
 from pbrl_mismatch.search.fitted import Fitted, cut_stages, fit_from
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.library import search_library
+from pbrl_mismatch.search.library import of_every_shape, search_library
 from pbrl_mismatch.search.weigh import DISCREPANCY, weigh, worth_of_another
 
 FEW = ("viscous_drag", "floor_slope", "wrench_bias")
@@ -46,3 +46,10 @@ def test_nothing_is_simulated_where_the_path_has_no_use_for_it(
         asks = worth_of_another(weigh([base], found, OPTIONS))
         singles = len({each.hypothesis.effects for each in found})
         assert asks == pytest.approx(np.log(singles) + DISCREPANCY * (best.evidence - base.evidence))
+
+
+def test_a_contact_goes_on_in_every_shape_where_it_goes_on_at_all() -> None:
+    jobs = [(name, ground) for ground in (0, 1) for name in ("hidden_obstacle", "hidden_obstacle", "external_force")]
+    assert of_every_shape(jobs, [1]) == [0, 1]
+    assert of_every_shape(jobs, [2, 3]) == [2, 3, 4]
+    assert of_every_shape(jobs, [5]) == [5]

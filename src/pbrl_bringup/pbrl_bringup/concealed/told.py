@@ -162,8 +162,17 @@ def _hinge(told: Any, scene: Scene, mass: float) -> dict[str, float]:
 
 
 def _obstacle(told: Any, scene: Scene, mass: float) -> dict[str, float]:
-    middle = np.array(told["polygon"]).mean(axis=0)
-    return {"obstacle_x": float(middle[0]), "obstacle_y": float(middle[1]), "obstacle_radius": 0.05}
+    corners = np.array(told["polygon"])
+    middle, side = corners.mean(axis=0), corners[1] - corners[0]
+    turn = math.atan2(side[1], side[0])
+    # A square is the same turned by a quarter of a turn; its prior is about no turn.
+    turn -= 0.5 * math.pi * round(turn / (0.5 * math.pi))
+    return {
+        "obstacle_x": float(middle[0]),
+        "obstacle_y": float(middle[1]),
+        "obstacle_radius": 0.05,
+        "obstacle_angle": turn,
+    }
 
 
 def _unseen(told: Any, scene: Scene, mass: float) -> dict[str, float]:

@@ -73,6 +73,7 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("obstacle_y", "m", 0.0),
     ("obstacle_radius", "m", 0.1),
     ("obstacle_friction", "1", 0.0),
+    ("obstacle_angle", "rad", -10.0),
     ("wheel2_x", "m", 0.0),
     ("wheel2_y", "m", 0.0),
     ("wheel2_theta", "rad", 0.0),

@@ -1,4 +1,4 @@
-"""Compiled: where a footprint meets a disc, what holds it there or at a pivot, and a body that it pushes along."""
+"""Compiled: where a footprint meets a disc or a square, what holds it there or at a pivot, and what it pushes along."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.account_kernel import CREEP, SETTLING, push, resist
+from pbrl_mismatch.kernels.account_kernel import SETTLING, push, resist
 from pbrl_mismatch.kernels.crate_kernel import HELD, ROUND, STIFFNESS, crate_contact, move_crate
 from pbrl_mismatch.kernels.outline_kernel import nearest_edge
+from pbrl_mismatch.kernels.post_kernel import lean, post_contact
 from pbrl_mismatch.kernels.state import UNSEEN
 
 Array = NDArray[np.float64]
@@ -78,17 +79,13 @@ def contacts(
         give = k * dt + 2.0 * p[at.PIVOT_DAMPING] * math.sqrt(k * mass)
         resist(acc, rx, ry, 1.0, 0.0, give)
         resist(acc, rx, ry, 0.0, 1.0, give)
-    if p[at.OBSTACLE_STIFFNESS] > 0.0:
+    if p[at.OBSTACLE_STIFFNESS] > 0.0 and p[at.OBSTACLE_ANGLE] > ROUND:
+        post_contact(p, outline, state, c, s, com, dt, acc)
+    elif p[at.OBSTACLE_STIFFNESS] > 0.0:
         found = contact(p, outline, state, c, s, com, p[at.OBSTACLE_X], p[at.OBSTACLE_Y], p[at.OBSTACLE_RADIUS])
         depth, rx, ry, nx, ny = found
         if depth > 0.0:
-            k = p[at.OBSTACLE_STIFFNESS]
-            push(acc, rx, ry, -k * depth * nx, -k * depth * ny)
-            resist(acc, rx, ry, nx, ny, k * (dt + SETTLING))
-            if p[at.OBSTACLE_FRICTION] > 0.0:
-                slip = (state[4] + state[5] * rx) * nx - (state[3] - state[5] * ry) * ny
-                grip = p[at.OBSTACLE_FRICTION] * k * depth / math.sqrt(slip * slip + CREEP * CREEP)
-                resist(acc, rx, ry, -ny, nx, grip)
+            lean(p, state, rx, ry, nx, ny, depth, dt, acc)
     if p[at.UNSEEN_FORCE] > 0.0 and p[at.UNSEEN_ANGLE] > ROUND:
         crate_contact(p, outline, state, c, s, com, dt, acc)
     elif p[at.UNSEEN_FORCE] > 0.0:
