@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from pbrl_bringup.concealed.oracle import Oracle, non_centrality
+from pbrl_bringup.concealed import oracle
+from pbrl_bringup.concealed.oracle import STARTS, Oracle, non_centrality
 
 
 def test_one_number_is_found_in_95_percent_where_the_two_tails_say() -> None:
@@ -52,3 +53,16 @@ def test_strength_counts_in_units_of_the_least_that_is_found(times: float) -> No
 
 def test_nothing_gained_is_no_strength() -> None:
     assert Oracle(fitted(7, 999.0), fitted(3, 1000.0)).times_detectable == 0.0
+
+
+def test_its_starts_lie_beside_the_truth_on_every_scale(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[Any] = []
+    monkeypatch.setattr(oracle, "fit_from", lambda hypothesis, stages, starts, options: taken.append(starts))
+    parts = [SimpleNamespace(column=f"c{k}", positive=False) for k in range(50)]
+    told = {part.column: 3.0 for part in parts}
+    asked: Any = SimpleNamespace(mean=np.zeros(50), spread=np.full(50, 2.0), parameters=parts)
+    laid: Any = SimpleNamespace(options=SimpleNamespace(seed=0), stages=None)
+    oracle._fitted(asked, told, None, laid, STARTS)
+    np.testing.assert_array_equal(taken[0][0], 3.0)
+    off = np.sqrt(np.mean(((taken[0][1:] - 3.0) / 2.0) ** 2, axis=1))
+    assert np.all(np.diff(off) < 0.0) and off[-1] == pytest.approx(oracle.JITTER[1], rel=0.3)

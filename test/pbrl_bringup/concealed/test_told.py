@@ -14,7 +14,7 @@ from pbrl_bringup.concealed.cases import grip_turn
 from pbrl_bringup.concealed.draws import DRAWS
 from pbrl_bringup.concealed.recording import to_recording
 from pbrl_bringup.concealed.stage import NAME, Stage, draw_stage, play
-from pbrl_bringup.concealed.told import told_values
+from pbrl_bringup.concealed.told import _obstacle, told_values
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.diagnose import track_of
 from pbrl_mismatch.effects.effect import Scene
@@ -127,3 +127,13 @@ def test_places_on_the_body_are_where_the_body_stood(stage: Stage) -> None:
     away = np.array([told["pivot_x"] - x, told["pivot_y"] - y])
     c, s = math.cos(theta), math.sin(theta)
     np.testing.assert_allclose([c * away[0] + s * away[1], c * away[1] - s * away[0]], [0.2, -0.3])
+
+
+@pytest.mark.parametrize("quarters", range(-2, 3))
+def test_a_post_s_turn_is_told_within_a_quarter_of_a_turn(quarters: int) -> None:
+    turn = 0.3 + quarters * math.pi / 2.0
+    c, s = math.cos(turn), math.sin(turn)
+    corners = 0.05 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ np.array([[c, s], [-s, c]]) + [1.0, -2.0]
+    scene: Any = None
+    told = _obstacle({"polygon": corners.tolist()}, scene, 30.0)
+    assert [told[f"obstacle_{name}"] for name in ("x", "y", "angle")] == pytest.approx([1.0, -2.0, 0.3])

@@ -33,8 +33,9 @@ from pbrl_mismatch.search.told_baseline import ToldBaseline
 Array = NDArray[np.float64]
 
 STARTS = 6
-JITTER = 0.15
-"""Of the starts about the truth, in standard deviations of the prior."""
+JITTER = 0.15, 0.003
+"""Of the first and of the last start beside the truth, in standard deviations of the prior: a contact is met or missed
+by a centimetre where a post may be anywhere in a metre or two."""
 HOPELESS = 0.7
 """Times the detectable strength below which a first glance says no; it lacks some starts of a look."""
 
@@ -213,6 +214,7 @@ def _fitted(hypothesis: Hypothesis, values: Mapping[str, float], base: Fitted | 
         elif base is not None and parameter.column in base.hypothesis.columns:
             centre[k] = base.peak.coordinates[0, base.hypothesis.columns.index(parameter.column)]
     rng = np.random.default_rng(laid.options.seed)
-    starts = centre + JITTER * hypothesis.spread * rng.standard_normal((count, len(centre)))
+    beside = np.geomspace(*JITTER, count)[:, None] * hypothesis.spread
+    starts = centre + beside * rng.standard_normal((count, len(centre)))
     starts[0] = centre
     return fit_from(hypothesis, laid.stages, starts, laid.options)
