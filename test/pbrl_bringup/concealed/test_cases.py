@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from bullet_sim.hand_push import push_by_hand
-from bullet_sim.hand_recording import HandPath, HandPush
+from bullet_sim.hand_recording import Activity, HandPath, HandPush
 from pbrl_bag import read_recording, write_recording
-from pbrl_bringup.concealed.cases import Case, make
+from pbrl_bringup.concealed.cases import Case, make, not_read_away
 from pbrl_bringup.concealed.draws import DRAWS, between
 from pbrl_bringup.concealed.stage import NAME, SOFT, TURNING, Stage, about_pin, draw_stage, play
 
@@ -121,3 +121,19 @@ def test_strength_is_even_in_the_logarithm() -> None:
     assert between(2.0, 8.0, 0.0) == 2.0
     assert between(2.0, 8.0, 0.5) == pytest.approx(4.0)
     assert between(8.0, 2.0, 1.0) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("offset", "until"),
+    [
+        (lambda time: np.clip((time - 8.0) / 0.3, 0.0, 1.0), 20.0),
+        (lambda time: np.maximum(time - 8.0, 0.0) / 60.0, 41.0),
+    ],
+)
+def test_an_offset_that_was_read_before_a_grasp_does_not_act_in_it(offset: Any, until: float) -> None:
+    time = np.linspace(0.0, 40.0, 4001)
+    strength = offset(time)
+    grasps = [SimpleNamespace(time=at, body=body) for at, body in ((1.0, NAME), (19.0, None), (20.0, NAME))]
+    made: Any = SimpleNamespace(grasps=grasps)
+    acts = not_read_away(made, Activity("wrench_bias", "left", "1", time, strength > 0.0, strength))
+    np.testing.assert_array_equal(acts, (time > 8.0) & (time < until) & (time != 20.0))

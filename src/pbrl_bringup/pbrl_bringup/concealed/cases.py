@@ -27,6 +27,8 @@ LEAST_SHARE = 0.02
 """Of the time in which the table moves: an effect that acts for less is drawn again."""
 LEAST_MOVING = 0.25
 """Share of the time that a table has to move."""
+LEAST_OFFSET = 1e-6
+"""A sensor's offset that has changed by less [N, N m] is the same."""
 FIRST_POSES = 5
 """Poses of the gripper from which its turn against the body is taken."""
 PLACES = {"floor_patch": "polygon", "hidden_obstacle": "polygon", "second_wheel": "position", "hidden_hinge": "point"}
@@ -127,12 +129,24 @@ def _truth(case: Case, stage: Stage, concealed: dict[str, Any], made: HandRecord
     for effect in case.effects:
         acts = [activity for activity in made.activities.values() if activity.effect == effect]
         acting = np.logical_or.reduce([activity.acting for activity in acts]) if acts else np.zeros_like(moving)
+        if effect == "wrench_bias":
+            acting &= np.logical_or.reduce([not_read_away(made, activity) for activity in acts])
         joined = Activity(effect, NAME, "", made.bodies[NAME].time, acting, np.zeros(len(acting)))
         when[effect] = [(float(start), float(end)) for start, end in joined.intervals()]
         share[effect] = float(acting[moving].mean()) if moving.any() else 0.0
         place[effect] = _place(effect, concealed[effect])
     told = told_values(concealed, stage.with_concealed(concealed), grip_turn(made))
     return Truth(case.effects, NAME, concealed, when, place, strength, share, told)
+
+
+def not_read_away(made: HandRecording, offset: Activity) -> NDArray[np.bool_]:
+    """Return (n,) when a sensor's offset is another than it was when the sensor was last read before a grasp.
+
+    What it had then is taken out of the recording with the gripper's weight: it makes no difference to anything.
+    """
+    taken = np.array([change.time for change in made.grasps if change.body is not None])
+    read = np.concatenate([[0.0], np.interp(taken, offset.time, offset.strength)])
+    return np.asarray(np.abs(offset.strength - read[np.searchsorted(taken, offset.time, side="right")]) > LEAST_OFFSET)
 
 
 def grip_turn(made: HandRecording) -> float:
