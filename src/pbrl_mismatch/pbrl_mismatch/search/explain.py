@@ -41,7 +41,8 @@ EXPLAINS = 10.0
 LEADS = 3
 """So many of the likeliest effects lead a baseline to where they have the body's own parameters."""
 LED = 100.0
-"""Kinds of baseline that are worse than the best by more [nat] are not led: no other top would do."""
+"""Kinds of baseline that are worse than the best by more [nat] are not led: no other top would do. Nor are effects
+tried on richer kinds than the best that are."""
 FREEDOM = 1.0
 """An effect that says nothing is less likely than the baseline by about so much at least, for its freedom [nat]."""
 WORTH_A_SET = 3.0
@@ -307,10 +308,14 @@ def _tried(
 
 
 def _grounds(bases: list[Fitted]) -> list[Fitted]:
-    """Return the baselines that effects are tried on: the simplest, and the best where that is another.
+    """Return the baselines that effects are tried on: the simplest, the best where that is another, and richer ones.
 
-    The best kind alone will not do: what an effect did, a wheel with two axes may have learned to stand in for.
+    The best kind alone will not do: what an effect did, a wheel with two axes may have learned to stand in for; or it
+    hid that a wheel has two, so that a locked caster did as well.
     """
     simplest = min(bases, key=lambda each: len(each.hypothesis.parameters))
-    better = bases[0].evidence > simplest.evidence + WORTH_A_KIND
-    return [simplest, bases[0]] if better else [simplest]
+    if bases[0].evidence <= simplest.evidence + WORTH_A_KIND:
+        return [simplest]
+    least = len(bases[0].hypothesis.parameters), bases[0].evidence - LED
+    richer = [each for each in bases[1:] if len(each.hypothesis.parameters) > least[0] and each.evidence > least[1]]
+    return [simplest, bases[0], *richer]
