@@ -29,6 +29,9 @@ BASELINE_STARTS, BASELINE_STEPS, KEPT_OF_BASELINE = 20, 6, 4
 """A baseline is climbed along the path from so many starts, in so many steps; so many go on to windows."""
 WHOLE = 4
 """Steps from the best of the kept windows to that of all."""
+OF_FRICTION = frozenset({"mu_x", "mu_y"})
+FELT = 0.1, 1.0
+"""Friction of a wheel over the body's weight that a baseline is climbed from, and the spread of its logarithm."""
 MOVING = 0.02
 """Slower than this [m/s] is not taken for the speed of a push."""
 
@@ -212,6 +215,10 @@ def fit_baseline(
     for k, name in enumerate(columns):
         if name in BELIEVED:
             starts[:, k] = hypothesis.mean[k]
+        if name in OF_FRICTION:
+            # From friction that is too little to be felt nothing leads back.
+            drawn = (starts[:, k] - hypothesis.mean[k]) / hypothesis.spread[k]
+            starts[:, k] = math.log(FELT[0]) + FELT[1] * drawn
     if "wheel_x" in columns:
         x, y = columns.index("wheel_x"), columns.index("wheel_y")
         com = track.body[1:3]
