@@ -143,6 +143,14 @@ def test_places_and_strengths_are_those_of_the_file(tmp_path: Path) -> None:
     assert hold.stiffness == pytest.approx(2000.0) and hold.play == 2e-3
 
 
+def test_a_post_is_as_square_as_it_was_found(tmp_path: Path) -> None:
+    numbers = {**NUMBERS["hidden_obstacle"], "obstacle_angle": 0.3}
+    numbers.pop("obstacle_friction")
+    post = with_model(scene(), write(tmp_path, {"hidden_obstacle": numbers})).concealed.hidden_obstacle[0]
+    assert len(post.polygon) == 4 and np.allclose(np.abs(post.polygon), 0.1)
+    assert np.allclose(post.pose, [2.5, 0.0, 0.3])
+
+
 def test_feet_beside_a_wheel_slide_with_the_whole_friction(tmp_path: Path) -> None:
     wheel = {"wheel_x": -0.3, "wheel_y": 0.2, "mu_x": 0.14}
     made = with_model(scene(), write(tmp_path, {"ground_friction": {"slide_mu": 0.06}}, wheel, mu_y=-1.0)).concealed

@@ -29,7 +29,7 @@ LEAST_GIVE = 1e-5
 CORNERS = 16
 """Of a disc."""
 DISC = -10.0
-"""An `unseen_angle` at or below it means one."""
+"""An `unseen_angle` or `obstacle_angle` at or below it means one."""
 
 
 @dataclass(frozen=True)
@@ -233,18 +233,21 @@ def _disc(told: Told, name: str) -> list[list[float]]:
     return [[radius * math.cos(angle), radius * math.sin(angle)] for angle in angles]
 
 
+def _standing(told: Told, name: str) -> dict[str, Any]:
+    """Return the outline of a thing on the floor, a disc or a square, and its pose."""
+    half, angle = told[f"{name}_radius"], told.get(f"{name}_angle", DISC)
+    square = [[half * x, half * y] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    outline, turn = (square, angle) if angle > DISC else (_disc(told, name), 0.0)
+    return {"polygon": outline, "pose": [*told.place(name), turn]}
+
+
 def _hidden_obstacle(told: Told) -> dict[str, Any]:
-    pillar = {"polygon": _disc(told, "obstacle"), "pose": [*told.place("obstacle"), 0.0]}
-    return {"hidden_obstacle": [pillar]}
+    return {"hidden_obstacle": [_standing(told, "obstacle")]}
 
 
 def _unseen_body(told: Told) -> dict[str, Any]:
     mass = told["unseen_force"] / (CRATE_FRICTION * GRAVITY)
-    half, angle = told["unseen_radius"], told.get("unseen_angle", DISC)
-    square = [[half * x, half * y] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    outline, turn = (square, angle) if angle > DISC else (_disc(told, "unseen"), 0.0)
-    crate = {"polygon": outline, "pose": [*told.place("unseen"), turn], "nominal_mass": mass}
-    return {"unseen_body": [{**crate, "friction": CRATE_FRICTION}]}
+    return {"unseen_body": [{**_standing(told, "unseen"), "nominal_mass": mass, "friction": CRATE_FRICTION}]}
 
 
 def _external_force(told: Told) -> dict[str, Any]:
