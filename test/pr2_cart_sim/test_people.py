@@ -51,6 +51,27 @@ def test_a_pause_at_the_ends_only(client):
     assert len(middle) < 20 < len(still)
 
 
+def test_who_has_manners_walks_past_a_cart_and_not_into_it(client):
+    """A doorway: the cart's front is 0.35 m ahead and a little aside, the way back into the room leads past it."""
+    cart = np.array([0.35, 0.08])
+    one = walker(client, Person(route=((0.0, 0.0), (0.0, 2.0)), speed=1.0, pause=0.0), social=True, patience=2.0)
+    one.place, one._next = np.array([0.0, 0.0]), 1
+    nearest = np.inf
+    for _ in range(150):
+        off = cart - one.place
+        gap = float(np.hypot(*off))
+        nearest = min(nearest, gap)
+        one.move(Nearness(gap, tuple(off / gap)))
+    assert one.place[1] > 1.0 and nearest > 0.3
+    into = walker(client, Person(route=((0.0, 0.0), (1.0, 0.0)), speed=1.0, pause=0.0), social=True, patience=1e3)
+    into.place, into._next = np.array([0.0, 0.0]), 1
+    for _ in range(150):
+        off = cart + np.array([0.5, 0.0]) - into.place
+        gap = float(np.hypot(*off))
+        into.move(Nearness(gap, tuple(off / gap)))
+    assert gap == pytest.approx(0.4, abs=0.03), "straight at it they stop at their margin"
+
+
 @pytest.mark.parametrize("social", [True, False])
 def test_manners_decide_how_near_they_come(client, social):
     one = walker(client, Person(route=((0.0, 0.0), (5.0, 0.0)), speed=1.0, pause=0.0), social=social, patience=1000.0)

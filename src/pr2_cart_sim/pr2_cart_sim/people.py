@@ -26,6 +26,9 @@ TICK = 0.01
 """[s] between two moves of people."""
 TOUCH = 0.01
 """[m] from the robot at which somebody without manners stands, too."""
+PAST, ROOM = 0.4, 0.5
+"""Cosine of the angle between somebody's way and the nearest of robot and cart below which it leads past; and the share
+of their margin that has to be left for that."""
 TURNING = 4.0
 """Rate [rad/s] at which people turn."""
 ARRIVED = 0.05
@@ -132,10 +135,15 @@ class Walker:
         self._next += 1 if self._forward else -1
 
     def _is_stopped(self, near: Nearness | None, direction: Array) -> bool:
-        """Tell whether robot or cart is in the way: too near, and nearer with every step."""
+        """Tell whether robot or cart is in the way: too near, and nearer with every step.
+
+        Who has manners walks past as long as there is room. Else robot and somebody in a doorway wait for each other
+        for ever: every way out, back into the room as well, leads a little nearer.
+        """
         if near is None or near.distance >= (self._manners.margin if self._manners.social else TOUCH):
             return False
-        return direction[0] * near.direction[0] + direction[1] * near.direction[1] > 0
+        past = PAST if self._manners.social and near.distance > ROOM * self._manners.margin else 0.0
+        return direction[0] * near.direction[0] + direction[1] * near.direction[1] > past
 
     def _wait(self) -> None:
         """Stand before what is in the way; turn back once patience is at its end."""
