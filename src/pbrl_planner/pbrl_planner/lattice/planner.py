@@ -22,7 +22,7 @@ AT_ONCE = 20_000
 LARGEST_HEAP = 1 << 28
 FURTHER = 1.1
 """Times the bound of the start, up to which the lower bound is made before there is a plan."""
-NEAR = 24
+NEAR = 8
 """Cells from either end of the way within which no state is left out: there is little room where a robot stops."""
 SCOUTED = 5_000
 """Expansions of a search that leaves states out, at most, before it leaves out fewer."""

@@ -58,12 +58,18 @@ class Shelf:
             return Records(np.zeros(states, dtype=np.int64), 1)
         return Records(kept.array, kept.stamp + 1)
 
-    def have_records(self, states: int) -> None:
-        """Have memory for a search over so many states there: what is only promised is cleared by the first search."""
+    def have_memory(self, states: int) -> None:
+        """Have memory for a search over so many states, and for the answers so far, there.
+
+        What is only promised is cleared by whoever touches it first. Nothing that was answered is known any more.
+        """
         records = self.take_records(states)
         if records.stamp == 1:
             records.array.fill(0)
         self.give_back(records)
+        for each in self._answers.values():
+            each.free.fill(0)
+            each.known.fill(0)
 
     def give_back(self, records: Records) -> None:
         """Keep an array for the next search."""

@@ -7,7 +7,7 @@ import numpy as np
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.lattice.grid import CostGrid
 from pbrl_planner.lattice.lattice import Lattice
-from pbrl_planner.lattice.motions import Motions
+from pbrl_planner.lattice.motions import Direction, Motions
 from pbrl_planner.lattice.planner import plan
 from pbrl_planner.lattice.problem import LatticeProblem
 from pbrl_planner.lattice.reach import reach
@@ -17,6 +17,8 @@ PATIENCE = 120.0
 """[s] that it may take where everything is compiled first."""
 STEP = 0.3
 """[m] that a robot which is nowhere goes."""
+DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
+"""Of searches and floods."""
 
 
 def warm_up(motions: Motions, grid: CostGrid, settings: LatticeSettings) -> None:
@@ -32,7 +34,9 @@ def warm_up(motions: Motions, grid: CostGrid, settings: LatticeSettings) -> None
     """
     empty = CostGrid(np.zeros_like(grid.cells), grid.resolution, grid.origin, grid.blocked, grid.lethal)
     lattice = Lattice(empty, motions)
-    motions.shelf.have_records(lattice.cells * lattice.primitives.bins)
+    for direction in DIRECTIONS:
+        lattice.sweeps(direction)
+    motions.shelf.have_memory(lattice.cells * lattice.primitives.bins)
     rows, columns = grid.cells.shape
     begin = np.array([*grid.centre_of(columns // 2, rows // 2), 0.0, 0.0])
     try:
