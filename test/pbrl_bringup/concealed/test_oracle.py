@@ -51,6 +51,13 @@ def test_strength_counts_in_units_of_the_least_that_is_found(times: float) -> No
     assert beside.times_detectable == pytest.approx(times)
 
 
+def test_of_several_effects_the_faintest_counts() -> None:
+    told, none = fitted(7, 1000.0 - 16.0 * non_centrality(4) - 4.0), fitted(3, 1000.0)
+    alone = fitted(3, told.peak.misfit[0] + 2.25 * non_centrality(4) + 4.0)
+    assert Oracle(told, none).times_detectable == pytest.approx(4.0)
+    assert Oracle(told, none, (none, alone)).times_detectable == pytest.approx(1.5)
+
+
 def test_nothing_gained_is_no_strength() -> None:
     assert Oracle(fitted(7, 999.0), fitted(3, 1000.0)).times_detectable == 0.0
 

@@ -39,7 +39,9 @@ def rows_of(scores: Sequence[Score]) -> list[Row]:
         rows.append(_share("furnished: effect named first", told, 0.80))
     if by_set.get("pairs"):
         told = [each.first for each in by_set["pairs"]]
-        rows.append(_share("pairs: both effects named, and nothing before them", told, 0.70))
+        strong = [each.first for each in by_set["pairs"] if each.times_detectable >= STRONG]
+        clear = {f"each_{STRONG:g}_times_what_can_be_seen": f"{sum(strong)} of {len(strong)}"}
+        rows.append(_share("pairs: both effects named, and nothing before them", told, 0.70, **clear))
     if by_set.get("withheld"):
         rows.append(_withheld(by_set["withheld"]))
     hidden = by_set.get("single", [])

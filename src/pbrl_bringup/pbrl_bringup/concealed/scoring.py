@@ -32,7 +32,7 @@ class Oracle:
     Attributes:
         error: held-out position error [m].
         gain: log evidence over the baseline's [nat].
-        times: strength over what it detects in 95 % of recordings.
+        times: strength over what it detects in 95 % of recordings, of several effects the faintest's beside the others.
     """
 
     error: float = math.nan
@@ -86,7 +86,8 @@ class Score:
         floor: noise of a pose in position [m].
         oracle: held-out position error of a told oracle [m], NaN where none was asked.
         oracle_gain: of the oracle over the baseline [nat].
-        times_detectable: strength over what a told oracle detects in 95 % of recordings, NaN where none was asked.
+        times_detectable: strength over what a told oracle detects in 95 % of recordings, NaN where none was asked; of
+            several effects the faintest's beside the others.
         located: how well it was localised; NaN on clean recordings.
         places: how far off in place [m], by effect that is named right and has one.
         moments: how far off in the moment at which it began [s], likewise.
