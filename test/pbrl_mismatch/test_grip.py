@@ -13,6 +13,8 @@ from pbrl_bag.types import Recording
 from pbrl_mismatch import track_of
 from pbrl_mismatch.data.grip import GripTrack, lay_grips
 from pbrl_mismatch.effects.grasp_compliance import PARAMETERS
+from pbrl_mismatch.effects.pose_bias import PARAMETERS as TAG_PARAMETERS
+from pbrl_mismatch.kernels.columns import neutral_row
 from pbrl_mismatch.search.grip import (
     CAMERA_SPREAD,
     FREE_PLACE,
@@ -22,6 +24,7 @@ from pbrl_mismatch.search.grip import (
     SOFT_FORCE,
     grip_evidence,
 )
+from pbrl_mismatch.search.hypothesis import Hypothesis
 
 DELAY, NOISE = 0.005, 0.002
 CONTACT = np.array([[0.5, 0.1], [-0.2, -0.4]])
@@ -60,15 +63,15 @@ def test_a_tag_s_offset_shows_where_the_edge_turns_and_none_is_held_against_it()
     for seed in range(6):
         grips = readings(np.random.default_rng(seed))
         there = np.array([0.04, -0.03, 0.02])
-        with_tag = grip_evidence(seen_off(grips, there), DELAY)
-        assert with_tag.of_tag(none, wide) > 10.0 and grip_evidence(grips, DELAY).of_tag(none, wide) < 0.0
+        with_tag = grip_evidence(seen_off(grips, there), DELAY).rigid
+        assert with_tag.of_tag(none, wide) > 10.0 and grip_evidence(grips, DELAY).rigid.of_tag(none, wide) < 0.0
         # An offset that is known is better than one that is not, and a wrong one is worse.
         assert with_tag.of_tag(there, 1e-6 * np.eye(3)) > with_tag.of_tag(none, wide)
         assert with_tag.of_tag(-there, 1e-6 * np.eye(3)) < 0.0
 
 
 def test_the_odds_of_a_tag_s_offset_are_those_of_the_gaussian_that_it_is() -> None:
-    found = grip_evidence(readings(np.random.default_rng(0)), DELAY)
+    found = grip_evidence(readings(np.random.default_rng(0)), DELAY).rigid
     rng, mean = np.random.default_rng(1), np.array([0.004, -0.002, 0.003])
     spread = np.diag([0.004, 0.003, 0.01]) ** 2
     draws = rng.multivariate_normal(mean, spread, 200_000)
@@ -105,9 +108,9 @@ def test_the_evidence_is_that_of_the_gaussian_that_the_law_is() -> None:
         return float(value) + 0.5 * len(seen) * np.log(2.0 * np.pi * variance)
 
     soft = [parameter.spread for parameter in PARAMETERS]
-    assert found.rigid == pytest.approx(evidence([NEW_RUBBER_SPREAD, 1e-9, DELAY]), abs=1e-3)
-    assert found.gives == pytest.approx(evidence([*soft, DELAY]), abs=1e-3)
-    assert found.late == pytest.approx(evidence([NEW_RUBBER_SPREAD, 1e-9, 0.12]), abs=1e-3)
+    assert found.rigid.evidence == pytest.approx(evidence([NEW_RUBBER_SPREAD, 1e-9, DELAY]), abs=1e-3)
+    assert found.gives.evidence == pytest.approx(evidence([*soft, DELAY]), abs=1e-3)
+    assert found.late.evidence == pytest.approx(evidence([NEW_RUBBER_SPREAD, 1e-9, 0.12]), abs=1e-3)
 
 
 def test_p_values_are_uniform_where_the_hold_is_as_it_should_be() -> None:
@@ -124,14 +127,18 @@ def test_a_hold_that_gives_is_seen_and_measured(compliance: float, play: float) 
     rng, off = np.random.default_rng(2), []
     for _ in range(30):
         found = grip_evidence(readings(rng, compliance, play), DELAY)
-        assert found.p_value < 1e-6 and found.gives > max(found.rigid, found.late) + 5.0
-        off.append(np.linalg.solve(np.linalg.cholesky(found.covariance), found.mean - [compliance, play]))
+        assert found.p_value < 1e-6 and found.gives.evidence > max(found.rigid.evidence, found.late.evidence) + 5.0
+        off.append(
+            np.linalg.solve(
+                np.linalg.cholesky(found.gives.covariance[:2, :2]), found.gives.mean[:2] - [compliance, play]
+            )
+        )
     assert 0.6 < np.mean(np.square(off)) < 1.6
 
 
 def test_poses_that_are_late_are_no_soft_hold() -> None:
     found = grip_evidence(readings(np.random.default_rng(3), late=0.1), DELAY)
-    assert found.late > max(found.rigid, found.gives) + 5.0 and found.p_value < 1e-6
+    assert found.late.evidence > max(found.rigid.evidence, found.gives.evidence) + 5.0 and found.p_value < 1e-6
 
 
 def test_readings_lie_where_the_gripper_holds(concealed_recording: Callable[..., Recording]) -> None:
@@ -140,11 +147,31 @@ def test_readings_lie_where_the_gripper_holds(concealed_recording: Callable[...,
     assert grips is not None and len(grips.time) > 25
     assert set(grips.grasp) == {0} and np.all(np.diff(grips.time) > 0.0)
     found = grip_evidence(grips, DELAY)
-    assert found.gives > found.rigid + 5.0
+    assert found.gives.evidence > found.rigid.evidence + 5.0
     clean = concealed_recording("clean", 1)
     rigid = lay_grips(clean, track_of(clean, "table"))
     assert rigid is not None
     assert np.abs(rigid.place).max() < 0.012 and grip_evidence(rigid, DELAY).p_value > 0.01
+
+
+def test_what_one_effect_says_of_the_readings_the_others_are_held_against() -> None:
+    nothing = np.zeros(0), np.zeros((0, 0))
+
+    def with_effects(*names: str) -> Hypothesis:
+        return Hypothesis(names, "free", (), neutral_row())
+
+    late = grip_evidence(readings(np.random.default_rng(3), late=0.1), DELAY)
+    assert late.beyond(with_effects(), *nothing) > 5.0 > late.beyond(with_effects("time_offset"), *nothing)
+    both = grip_evidence(readings(np.random.default_rng(3), 6e-4, late=0.1), DELAY)
+    for names in (("grasp_compliance",), ("time_offset",)):
+        assert both.beyond(with_effects(*names), *nothing) > 5.0
+    assert both.beyond(with_effects("grasp_compliance", "viscous_drag", "time_offset"), *nothing) < 5.0
+    # What the motion says of a tag is what the readings are held against; what else is on does not matter.
+    wide, off = np.diag([0.06, 0.06, 0.15]) ** 2, np.array([0.04, -0.03, 0.02])
+    tag = grip_evidence(seen_off(readings(np.random.default_rng(5)), off), DELAY)
+    named = Hypothesis(("pose_bias",), "free", TAG_PARAMETERS, neutral_row())
+    assert tag.beyond(with_effects("viscous_drag"), *nothing) > 5.0 > tag.beyond(named, off, 1e-6 * wide)
+    assert tag.beside(named, np.zeros(3), wide) > tag.beside(named, -off, 1e-6 * wide)
 
 
 def test_where_no_gripper_was_seen_nothing_is_said(concealed_recording: Callable[..., Recording]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from pbrl_bag.types import Recording
 from pbrl_mismatch import DiagnoseOptions, track_of
 from pbrl_mismatch.search.fitted import Fitted, cut_stages, fit_from
+from pbrl_mismatch.search.grip import GripEvidence, GripLaw, beside_motion
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.library import of_every_shape, search_library
 from pbrl_mismatch.search.weigh import DISCREPANCY, weigh, worth_of_another
@@ -46,6 +48,21 @@ def test_nothing_is_simulated_where_the_path_has_no_use_for_it(
         asks = worth_of_another(weigh([base], found, OPTIONS))
         singles = len({each.hypothesis.effects for each in found})
         assert asks == pytest.approx(np.log(singles) + DISCREPANCY * (best.evidence - base.evidence))
+
+
+def test_what_only_the_grippers_poses_show_is_worth_simulating(
+    concealed_recording: Callable[..., Recording],
+) -> None:
+    track, stages, base = base_of(concealed_recording("clean", 1))
+    law = GripLaw(-190.0, np.zeros(3), np.eye(3), np.zeros(3), np.eye(3))
+    late = replace(law, evidence=-120.0)
+    laws = {(gives, is_late): late if is_late else law for gives in (False, True) for is_late in (False, True)}
+    grip = GripEvidence(laws, 1e-9)
+    options = OPTIONS.model_copy(update={"without": tuple(n for n in OPTIONS.without if n != "time_offset")})
+    base = beside_motion(base, grip)
+    assert not search_library(np.random.SeedSequence(0), track, [base], stages, options, WORTH)
+    found = search_library(np.random.SeedSequence(0), track, [base], stages, options, WORTH, grip)
+    assert ("time_offset",) in {each.hypothesis.effects for each in found}
 
 
 def test_a_contact_goes_on_in_every_shape_where_it_goes_on_at_all() -> None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, plain
 
+PARAMETERS = (plain("tag_x", 0.0, 0.06), plain("tag_y", 0.0, 0.06), plain("tag_theta", 0.0, 0.15))
+"""No scene scales them."""
+
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
     """Return what is believed of its parameters."""
-    return (
-        plain("tag_x", 0.0, 0.06),
-        plain("tag_y", 0.0, 0.06),
-        plain("tag_theta", 0.0, 0.15),
-    )
+    return PARAMETERS
 
 
 EFFECT = Effect(

@@ -155,8 +155,11 @@ def _grounds_of_sets(likeliest: list[Fitted], track: Track) -> list[Fitted]:
 
 def _lacks(best: Fitted, grip: GripEvidence | None, options: DiagnoseOptions) -> bool:
     """Tell whether something is left out of what explains most: in the motion, or in the gripper's poses beside it."""
-    slips = grip is not None and GRASP_COMPLIANCE not in best.hypothesis.effects and grip.p_value < options.level
-    return slips or predictive_test(best.peak, 0).p_value < options.level
+    if grip is not None and grip.p_value < options.level:
+        peak = best.peak
+        if grip.beyond(best.hypothesis, peak.coordinates[0], peak.covariance(0)) > 0.0:
+            return True
+    return predictive_test(best.peak, 0).p_value < options.level
 
 
 def _falls_short(tried: list[Fitted]) -> bool:
@@ -299,7 +302,7 @@ def _tried(
 
     Nothing is returned where no effect's path is likelier than its ground's by `least` [nat].
     """
-    found = [beside_motion(each, grip) for each in search_library(seed, track, grounds, stages, options, least)]
+    found = [beside_motion(each, grip) for each in search_library(seed, track, grounds, stages, options, least, grip)]
     if not found and least > -math.inf:
         return []
     if grip is not None and GRASP_COMPLIANCE in options.effects:

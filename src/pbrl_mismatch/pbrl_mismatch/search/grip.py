@@ -13,23 +13,28 @@ plates about the true one, the gripper's point swings about it.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.stats import f as f_distribution
 
 from pbrl_mismatch.data.grip import GripTrack
 from pbrl_mismatch.effects.grasp_compliance import PARAMETERS
+from pbrl_mismatch.effects.pose_bias import PARAMETERS as TAG_PARAMETERS
 from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.search.fitted import Fitted
+from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Reduced
 
 Array = NDArray[np.float64]
 
 GRASP_COMPLIANCE, LATENESS, TAG_OFFSET = "grasp_compliance", "time_offset", "pose_bias"
 """Effects that show between gripper and body."""
-TAG = ("tag_x", "tag_y", "tag_theta")
+TAG = tuple(parameter.column for parameter in TAG_PARAMETERS)
 NEW_RUBBER, NEW_RUBBER_SPREAD = 5e-5, 3e-5
 """Compliance of a hold that is as it should be [m/N]."""
 SOFT_FORCE = 0.5
@@ -40,29 +45,23 @@ RANK = 1e-4
 """Directions of the places that are weaker than this share of the strongest are none."""
 LATE_SPREAD = 0.12
 """Of a delay that is a fault, as in the effect `time_offset` [s]."""
-GIVES, PLAYS, LATE = 0, 1, 2
+GIVES, PLAYS = 0, 1
 """Columns of what is learned beside the grasps' places."""
 
 
 @dataclass(frozen=True)
-class GripEvidence:
-    """What the grippers' poses say.
+class GripLaw:
+    """What the grippers' poses say where a hold gives way or does not, and a stream is late or is not.
 
     Attributes:
-        rigid: log evidence that the hold is as it should be and no stream late [nat], up to a common constant.
-        gives: that the hold gives way.
-        late: that the body's poses are late against the gripper's.
-        p_value: chance of so large a misfit if it is rigid.
-        mean: (2,) compliance [m/N] and play [m] if it gives.
-        covariance: (2, 2) of those.
+        evidence: its log evidence [nat], up to a common constant.
+        mean: (3,) compliance [m/N], play [m] and lateness [s].
+        covariance: (3, 3) of those.
         tag_pull: (3,) slope of the log evidence in a tag's offset (x, y [m], turn [rad]), from none.
         tag_precision: (3, 3) its curvature, taken negative.
     """
 
-    rigid: float
-    gives: float
-    late: float
-    p_value: float
+    evidence: float
     mean: Array
     covariance: Array
     tag_pull: Array
@@ -78,6 +77,76 @@ class GripEvidence:
         return at_mean + gained - 0.5 * float(np.linalg.slogdet(inner)[1])
 
 
+@dataclass(frozen=True)
+class GripEvidence:
+    """What the grippers' poses say.
+
+    Attributes:
+        laws: by whether the hold gives way, and whether the body's poses are late against the gripper's.
+        p_value: chance of so large a misfit if the hold is as it should be and no stream late.
+    """
+
+    laws: Mapping[tuple[bool, bool], GripLaw]
+    p_value: float
+
+    @property
+    def rigid(self) -> GripLaw:
+        """Return that all is as it should be."""
+        return self.laws[False, False]
+
+    @property
+    def gives(self) -> GripLaw:
+        """Return that the hold gives way."""
+        return self.laws[True, False]
+
+    @property
+    def late(self) -> GripLaw:
+        """Return that the body's poses are late."""
+        return self.laws[False, True]
+
+    def beside(self, hypothesis: Hypothesis, coordinates: Array, covariance: Array) -> float:
+        """Return the log evidence of the readings for a hypothesis, of which the motion is known [nat].
+
+        A stream that is late may be the body's poses or the wrenches: only the first shows against the gripper.
+
+        Args:
+            hypothesis: with effects.
+            coordinates: (K,) mean of what its motion says.
+            covariance: (K, K).
+        """
+        effects, columns = hypothesis.effects, hypothesis.columns
+        mean, spread = np.zeros(3), np.zeros((3, 3))
+        free = [k for k, name in enumerate(TAG) if name in columns]
+        there = [columns.index(TAG[k]) for k in free]
+        mean[free], spread[np.ix_(free, free)] = coordinates[there], covariance[np.ix_(there, there)]
+
+        def of(late: bool) -> float:
+            law = self.laws[GRASP_COMPLIANCE in effects, late]
+            return law.evidence + (law.of_tag(mean, spread) if TAG_OFFSET in effects else 0.0)
+
+        return float(np.logaddexp(of(False), of(True)) - np.log(2.0)) if LATENESS in effects else of(False)
+
+    def beyond(self, hypothesis: Hypothesis, coordinates: Array, covariance: Array) -> float:
+        """Return how much likelier the readings are with the best of their effects that a hypothesis lacks [nat].
+
+        Args:
+            hypothesis: that is to explain them.
+            coordinates: (K,) mean of what its motion says.
+            covariance: (K, K).
+        """
+        known = self.beside(hypothesis, coordinates, covariance)
+        gained = [-math.inf]
+        for name, added in ((GRASP_COMPLIANCE, ()), (LATENESS, ()), (TAG_OFFSET, TAG_PARAMETERS)):
+            if name in hypothesis.effects:
+                continue
+            effects = (*hypothesis.effects, name)
+            richer = replace(hypothesis, effects=effects, parameters=(*hypothesis.parameters, *added))
+            mean = np.concatenate([coordinates, [each.mean for each in added]])
+            spread = block_diag(covariance, *([each.spread**2] for each in added))
+            gained.append(self.beside(richer, mean, spread) - known)
+        return max(gained)
+
+
 def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence:
     """Weigh what may act between gripper and body.
 
@@ -86,9 +155,9 @@ def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence:
         delay_spread: of a delay that is no fault [s].
     """
     laws, places, seen = _laws(grips)
+    tag = _tag_law(grips)
     known = _place_spread(places.shape[1])
-    usual = np.array([NEW_RUBBER_SPREAD, 1e-9, delay_spread])
-    soft = np.array([p.spread for p in PARAMETERS])
+    stiff, soft = (NEW_RUBBER_SPREAD, 1e-9), tuple(p.spread for p in PARAMETERS)
     # Noise from the richest law, freed of all of them: a hold that gives is no worse sensor.
     every = np.column_stack([places, laws])
     own, _, rank, _ = np.linalg.lstsq(every, seen, rcond=RANK)
@@ -96,36 +165,24 @@ def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence:
     rest = float(np.sum((seen - every @ own) ** 2))
     variance = rest / count
     shifted = seen - laws[:, GIVES] * NEW_RUBBER
+    design, both = np.column_stack([places, laws]), np.column_stack([shifted, tag])
 
-    def weigh(spread: Array) -> tuple[float, Array, Array]:
-        design = np.column_stack([places, laws])
+    def weigh(gives: bool, late: bool) -> GripLaw:
+        spread = [*(soft if gives else stiff), LATE_SPREAD if late else delay_spread]
         prior = np.concatenate([known, spread]) ** -2.0
         matrix = design.T @ design / variance + np.diag(prior)
-        found = np.linalg.solve(matrix, design.T @ shifted / variance)
-        left = np.sum((shifted - design @ found) ** 2) / variance + np.sum(prior * found**2)
-        value = -0.5 * float(left) - 0.5 * float(np.linalg.slogdet(matrix)[1]) + 0.5 * float(np.sum(np.log(prior)))
-        inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
-        return value, np.asarray(found[-3:], dtype=np.float64), inverse[-3:, -3:]
+        found = np.linalg.solve(matrix, design.T @ both / variance)
+        unlikely = (both - design @ found) / variance
+        # What is left, weighed by its own covariance, is what is left times what is unlikely of it.
+        value = -0.5 * float(shifted @ unlikely[:, 0]) - 0.5 * float(np.linalg.slogdet(matrix)[1])
+        value += 0.5 * float(np.sum(np.log(prior)))
+        inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)[-3:, -3:]
+        mean = np.array([NEW_RUBBER, 0.0, 0.0]) + found[-3:, 0]
+        return GripLaw(value, mean, inverse, tag.T @ unlikely[:, 0], tag.T @ unlikely[:, 1:])
 
-    rigid, _, _ = weigh(usual)
-    gives, mean, spread = weigh(np.array([*soft, delay_spread]))
-    late, _, _ = weigh(np.array([usual[0], usual[1], LATE_SPREAD]))
-    tag = _tag_law(grips)
-    design, prior = np.column_stack([places, laws]), np.concatenate([known, usual]) ** -2.0
-    both = np.column_stack([shifted, tag])
-    found = np.linalg.solve(design.T @ design / variance + np.diag(prior), design.T @ both / variance)
-    unlikely = (both - design @ found) / variance
-    centre = np.array([NEW_RUBBER + mean[GIVES], mean[PLAYS]])
-    return GripEvidence(
-        rigid,
-        gives,
-        late,
-        _p_value(laws, places, shifted, usual, rest, count),
-        centre,
-        spread[: PLAYS + 1, : PLAYS + 1],
-        tag.T @ unlikely[:, 0],
-        tag.T @ unlikely[:, 1:],
-    )
+    found = {(gives, late): weigh(gives, late) for gives in (False, True) for late in (False, True)}
+    usual = np.array([*stiff, delay_spread])
+    return GripEvidence(found, _p_value(laws, places, shifted, usual, rest, count))
 
 
 def _laws(grips: GripTrack) -> tuple[Array, Array, Array]:
@@ -175,25 +232,10 @@ def _p_value(laws: Array, places: Array, seen: Array, usual: Array, rest: float,
 
 
 def beside_motion(fitted: Fitted, grip: GripEvidence | None) -> Fitted:
-    """Return a fitted hypothesis with what it makes of the grippers' poses counted.
-
-    A stream that is late may be the body's poses or the wrenches: only the first shows against the gripper.
-    """
-    effects = fitted.hypothesis.effects
-    if grip is None or GRASP_COMPLIANCE in effects:
+    """Return a fitted hypothesis with what it makes of the grippers' poses counted."""
+    if grip is None:
         return fitted
-    beside = grip.rigid
-    if LATENESS in effects:
-        beside = float(np.logaddexp(grip.rigid, grip.late) - np.log(2.0))
-    if TAG_OFFSET in effects:
-        columns = fitted.hypothesis.columns
-        at = [columns.index(name) if name in columns else None for name in TAG]
-        mean, covariance = np.zeros(3), np.zeros((3, 3))
-        free = [k for k, place in enumerate(at) if place is not None]
-        there = [place for place in at if place is not None]
-        mean[free] = fitted.peak.coordinates[0, there]
-        covariance[np.ix_(free, free)] = fitted.peak.covariance(0)[np.ix_(there, there)]
-        beside += grip.of_tag(mean, covariance)
+    beside = grip.beside(fitted.hypothesis, fitted.peak.coordinates[0], fitted.peak.covariance(0))
     return replace(fitted, beside=beside)
 
 
@@ -205,8 +247,9 @@ def gives_way(fitted: Fitted, grip: GripEvidence) -> Fitted:
         grip: what the grippers' poses say.
     """
     peak, hypothesis = fitted.peak, fitted.hypothesis
+    mean, covariance = grip.gives.mean[: PLAYS + 1], grip.gives.covariance[: PLAYS + 1, : PLAYS + 1]
     base = hypothesis.base.copy()
-    base[[COLUMN[p.column] for p in PARAMETERS]] = grip.mean
+    base[[COLUMN[p.column] for p in PARAMETERS]] = mean
     richer = replace(
         hypothesis,
         effects=(*hypothesis.effects, GRASP_COMPLIANCE),
@@ -216,13 +259,13 @@ def gives_way(fitted: Fitted, grip: GripEvidence) -> Fitted:
     )
     r, k, more = peak.reduced, len(hypothesis.parameters), ((0, 0), (0, 0), (0, len(PARAMETERS)))
     matrix = np.pad(r.matrix, (*more, more[-1]))
-    precision = np.linalg.inv(grip.covariance) - np.diag([p.spread**-2.0 for p in PARAMETERS])
+    precision = np.linalg.inv(covariance) - np.diag([p.spread**-2.0 for p in PARAMETERS])
     matrix[:, 0, k:, k:] = precision / np.maximum(peak.weight[:, 0, None, None], 1e-12)
     reduced = Reduced(matrix, np.pad(r.vector, more), np.pad(r.gain, ((0, 0), *more)), r.shift, r.log_det)
-    coordinates = np.column_stack([peak.coordinates, np.tile(grip.mean, (len(peak.coordinates), 1))])
+    coordinates = np.column_stack([peak.coordinates, np.tile(mean, (len(peak.coordinates), 1))])
     objective = replace(peak.objective, hypothesis=richer)
     extended = replace(peak, objective=objective, coordinates=coordinates, reduced=reduced)
-    added = replace(fitted, hypothesis=richer, peak=extended, short=None, shorter=None, beside=grip.gives)
+    added = beside_motion(replace(fitted, hypothesis=richer, peak=extended, short=None, shorter=None), grip)
     if fitted.shorter is None:
         return added
     return replace(added, shorter=gives_way(replace(fitted, peak=fitted.shorter, shorter=None), grip).peak)

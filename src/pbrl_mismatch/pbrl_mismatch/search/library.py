@@ -17,6 +17,7 @@ from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import Peak, climb
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart
+from pbrl_mismatch.search.grip import GripEvidence
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.climb import PathPeak
@@ -50,6 +51,7 @@ def search_library(
     stages: Stages,
     options: DiagnoseOptions,
     least: float = -math.inf,
+    grip: GripEvidence | None = None,
 ) -> list[Fitted]:
     """Fit every effect on top of every base, in threads; the bytes do not depend on how many.
 
@@ -63,6 +65,7 @@ def search_library(
         stages: windows.
         options: settings.
         least: where no effect is likelier along the path than what it is laid on by more [nat], none is simulated.
+        grip: what the grippers' poses say, which counts wherever effects are compared; None where none was seen.
 
     Returns:
         What was simulated to the end; nothing, where nothing is worth it.
@@ -93,14 +96,19 @@ def search_library(
 
     with ThreadPoolExecutor(options.workers) as pool:
         begun = list(pool.map(begin, range(len(jobs))))
+        laid = [each.hypothesis for each in begun]
+        on_path = [_likeliest(each.hypothesis, each, grip) for each in begun]
         if least > -math.inf:
-            before_it = {id(ground): ground.evidence for ground in grounds}
-            gained = [float(each.evidence.max()) - before_it[id(job[3])] for each, job in zip(begun, jobs, strict=True)]
+            before_it = {
+                id(base): ground.evidence + (base.beside if grip is not None else 0.0)
+                for base, ground in zip(bases, grounds, strict=True)
+            }
+            gained = [value - before_it[id(base)] for value, (_, _, base, _) in zip(on_path, jobs, strict=True)]
             if max(gained, default=-math.inf) < least:
                 return []
         stands_in = any(_path_above_simulation(base) > UNTOLD for base in bases)
         most = len(EFFECTS) if stands_in else options.shortlist
-        chosen = _survivors([each.hypothesis for each in begun], begun, most, CLOSE[0])
+        chosen = _survivors(laid, on_path, most, CLOSE[0])
         if min(each.noise_scale for each in begun) > RESTLESS:
             chosen = sorted({*chosen, *(k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].sticks)})
         pins = [k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].pins and may_be_pinned(longest.track)]
@@ -111,7 +119,7 @@ def search_library(
         running = list(pool.map(begin_simulated, chosen))
         # Short windows rank ways to part a wheel no better than the path does: several go on.
         kept = {hypothesis.variant: KEPT for hypothesis, starts in running if len(starts) > options.keep[0]}
-        first = _survivors([each.hypothesis for each in begun], begun, LEADING, 0.0)
+        first = _survivors(laid, on_path, LEADING, 0.0)
         leading = {begun[k].hypothesis.variant for k in (*first, *pins)} | set(kept)
         before: list[Peak | None] = [None] * len(running)
         for stage in range(len(stages.fitted)):
@@ -120,7 +128,8 @@ def search_library(
             peaks = list(pool.map(climbed, running))
             if stage + 1 == len(stages.fitted):
                 break
-            chosen = _survivors([each for each, _ in running], peaks, options.survivors[stage], CLOSE[1])
+            simulated = [_likeliest(each, peak, grip) for (each, _), peak in zip(running, peaks, strict=True)]
+            chosen = _survivors([each for each, _ in running], simulated, options.survivors[stage], CLOSE[1])
             # What the path says of long windows, short ones cannot take back.
             chosen = sorted({*chosen, *(k for k, (each, _) in enumerate(running) if each.variant in leading)})
             before = [peaks[k] for k in chosen]
@@ -180,14 +189,27 @@ def _ordered(peak: Peak) -> Peak:
     return peak.take(np.argsort(-peak.evidence, kind="stable"))
 
 
-def _survivors(
-    hypotheses: Sequence[Hypothesis], peaks: Sequence[Peak | PathPeak], most: int, close: float
-) -> list[int]:
-    """Return which hypotheses go on: the likeliest of each of so many effects, and others that are as good."""
-    evidence = np.array([float(np.nan_to_num(peak.evidence, nan=-np.inf).max()) for peak in peaks])
+def _likeliest(hypothesis: Hypothesis, peak: Peak | PathPeak, grip: GripEvidence | None) -> float:
+    """Return the evidence of the best point of a hypothesis, with what the grippers' poses say of it [nat]."""
+    evidence = np.nan_to_num(peak.evidence, nan=-np.inf)
+    if grip is not None and np.isfinite(evidence).any():
+        points = [int(k) for k in np.flatnonzero(np.isfinite(evidence))]
+        evidence[points] += [grip.beside(hypothesis, peak.coordinates[k], peak.covariance(k)) for k in points]
+    return float(evidence.max())
+
+
+def _survivors(hypotheses: Sequence[Hypothesis], evidence: Sequence[float], most: int, close: float) -> list[int]:
+    """Return which hypotheses go on: the likeliest of each of so many effects, and others that are as good.
+
+    Args:
+        hypotheses: those that are tried.
+        evidence: of each of them [nat].
+        most: so many effects go on.
+        close: others go on that are this near to the likeliest [nat].
+    """
     best: dict[tuple[str, ...], float] = {}
     for hypothesis, value in zip(hypotheses, evidence, strict=True):
-        best[hypothesis.effects] = max(best.get(hypothesis.effects, -np.inf), float(value))
+        best[hypothesis.effects] = max(best.get(hypothesis.effects, -np.inf), value)
     ranked = sorted(best, key=lambda effects: -best[effects])
     # Where all are close, more go on.
     ranked = [name for place, name in enumerate(ranked) if place < most or best[name] > best[ranked[0]] - close]

@@ -28,6 +28,7 @@ class PathPeak:
         misfit: (P, W) of the data, not scaled.
         counts: (W,) how many numbers were observed.
         evidence: (P,) log evidence by Laplace [nat], up to what is common to all hypotheses over these windows.
+        matrix: (P, K, K) curvature of the misfit in the coordinates, at the windows' scales.
     """
 
     hypothesis: Hypothesis
@@ -35,6 +36,11 @@ class PathPeak:
     misfit: Array
     evidence: Array
     counts: Array
+    matrix: Array
+
+    def covariance(self, row: int) -> Array:
+        """Return (K, K) of the coordinates at one point."""
+        return np.asarray(np.linalg.inv(self.matrix[row] + np.diag(self.hypothesis.spread**-2.0)), dtype=np.float64)
 
     @property
     def noise_scale(self) -> float:
@@ -107,4 +113,4 @@ def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations:
     matrix, _ = normal(residual, slope, weights(along, misfit))
     _, log_det = np.linalg.slogdet(matrix * np.outer(spread, spread) + np.eye(free))
     evidence = likelihood(along, misfit) - 0.5 * prior(u) - 0.5 * log_det
-    return PathPeak(hypothesis, u, misfit, evidence, along.counts)
+    return PathPeak(hypothesis, u, misfit, evidence, along.counts, matrix)
