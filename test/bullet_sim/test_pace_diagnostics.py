@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -17,9 +16,9 @@ from bullet_sim.ros.diagnostics import PaceDiagnostics
 
 
 @pytest.fixture
-def node() -> Iterator[Node]:
+def node(domain: int) -> Iterator[Node]:
     context = Context()
-    rclpy.init(context=context, domain_id=1 + os.getpid() % 100)
+    rclpy.init(context=context, domain_id=domain)
     made = Node("sim", context=context, enable_rosout=False)
     yield made
     made.destroy_node()

@@ -24,10 +24,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-DOMAIN = 60 + os.getpid() % 40
 PATIENCE = 60.0
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-ENVIRONMENT = os.environ | {"ROS_DOMAIN_ID": str(DOMAIN)}
 
 
 def command(*parameters: str) -> list[str]:
@@ -48,9 +46,14 @@ def scene_file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def listener() -> Iterator[Node]:
+def environment(domain: int) -> dict[str, str]:
+    return os.environ | {"ROS_DOMAIN_ID": str(domain)}
+
+
+@pytest.fixture
+def listener(domain: int) -> Iterator[Node]:
     context = Context()
-    rclpy.init(context=context, domain_id=DOMAIN)
+    rclpy.init(context=context, domain_id=domain)
     node = rclpy.create_node("listener", context=context)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
@@ -64,13 +67,13 @@ def listener() -> Iterator[Node]:
 
 
 @pytest.fixture
-def start(scene_file: Path) -> Iterator[Callable[..., subprocess.Popen]]:
+def start(scene_file: Path, environment: dict[str, str]) -> Iterator[Callable[..., subprocess.Popen]]:
     running: list[subprocess.Popen] = []
 
     def launch(*parameters: str) -> subprocess.Popen:
         process = subprocess.Popen(
             command(f"scene:={scene_file}", *parameters),
-            env=ENVIRONMENT,
+            env=environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
         )
@@ -102,23 +105,14 @@ def wait_for(node: Node, kind: type, topic: str, want: Callable = lambda message
     return found[0]
 
 
-def call(node: Node, kind: type, name: str, **fields):
-    client = node.create_client(kind, name)
-    assert client.wait_for_service(PATIENCE)
-    done = threading.Event()
-    future = client.call_async(kind.Request(**fields))
-    future.add_done_callback(lambda _: done.set())
-    assert done.wait(PATIENCE)
-    return future.result()
-
-
-def test_grasp_service_refuses_with_the_distance(start, listener):
+def test_grasp_service_refuses_with_the_distance(start, listener, ask):
     start()
-    answer = call(listener, GraspObject, "/grasp", gripper="left", object="desk")
+    grasp, release = listener.create_client(GraspObject, "/grasp"), listener.create_client(ReleaseObject, "/release")
+    answer = ask(grasp, GraspObject.Request(gripper="left", object="desk"))
     assert not answer.success
     assert answer.distance == pytest.approx(0.195, abs=0.01)
     assert f"{answer.distance:.3f} m" in answer.message
-    answer = call(listener, ReleaseObject, "/release", gripper="left")
+    answer = ask(release, ReleaseObject.Request(gripper="left"))
     assert not answer.success
     assert "holds nothing" in answer.message
 
@@ -156,8 +150,8 @@ def test_a_bad_command_is_warned_about_and_survived(start, listener):
     assert process.poll() is None
 
 
-def test_arguments_that_ros_cannot_read_are_no_traceback():
-    done = subprocess.run(command("rate"), env=ENVIRONMENT, capture_output=True, timeout=PATIENCE, text=True)
+def test_arguments_that_ros_cannot_read_are_no_traceback(environment):
+    done = subprocess.run(command("rate"), env=environment, capture_output=True, timeout=PATIENCE, text=True)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert done.stderr.splitlines()[-1].startswith("sim_node: ")
@@ -192,8 +186,8 @@ def test_a_signal_ends_it_quietly(start, listener, number):
         ("gui:=1", "gui: expected bool"),
     ],
 )
-def test_errors_at_start_are_one_line_and_exit_2(parameter, words):
-    done = subprocess.run(command(parameter), env=ENVIRONMENT, capture_output=True, timeout=PATIENCE, text=True)
+def test_errors_at_start_are_one_line_and_exit_2(parameter, words, environment):
+    done = subprocess.run(command(parameter), env=environment, capture_output=True, timeout=PATIENCE, text=True)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith("sim_node: ")

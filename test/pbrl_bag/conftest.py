@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -94,13 +92,7 @@ def push_bag(tmp_path: Path) -> Path:
     return write(tmp_path / "push", pushing())
 
 
-@pytest.fixture(scope="session")
-def ros_domain() -> Iterator[None]:
-    """Keep these tests' graph to itself."""
-    before = os.environ.get("ROS_DOMAIN_ID")
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
-    yield
-    if before is None:
-        del os.environ["ROS_DOMAIN_ID"]
-    else:
-        os.environ["ROS_DOMAIN_ID"] = before
+@pytest.fixture
+def ros_domain(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep a test's graph to itself."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -23,9 +22,9 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @pytest.fixture
-def node() -> Iterator[Node]:
+def node(domain: int) -> Iterator[Node]:
     context = Context()
-    rclpy.init(context=context, domain_id=1 + os.getpid() % 100)
+    rclpy.init(context=context, domain_id=domain)
     made = Node("watched", context=context, namespace="/robot_1", enable_rosout=False)
     yield made
     made.destroy_node()

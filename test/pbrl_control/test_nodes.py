@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -75,11 +74,11 @@ class World(Node):
 
 
 @pytest.fixture
-def spin_with(request: pytest.FixtureRequest) -> Iterator[Callable[[type[Node]], tuple]]:
+def spin_with(request: pytest.FixtureRequest, domain: int) -> Iterator[Callable[[type[Node]], tuple]]:
     """Give a function that makes a node and returns it, the world, and a spinner: `until(condition, act)`."""
     context_args = ["--ros-args", "-p", "use_sim_time:=true", "-p", "push_node:exit_when_done:=true"]
     context_args += getattr(request, "param", [])
-    rclpy.init(args=context_args, domain_id=1 + os.getpid() % 100)
+    rclpy.init(args=context_args, domain_id=domain)
     executor, nodes = SingleThreadedExecutor(), []
 
     def make(kind: type[Node]) -> tuple:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -29,7 +30,7 @@ from pbrl_model.posterior import Posterior
 from pbrl_model.ros.conversions import models_to_msg
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-PATIENCE = 120.0  # [s]
+PATIENCE, ASKED_AGAIN = 120.0, 5.0  # [s]
 GROUP = ("viscous_drag", "ground_friction", "floor_slope")
 MASS = 20.0
 
@@ -61,6 +62,22 @@ class User:
         future = client.call_async(request)
         self.until(future.done)
         return future.result()
+
+    def refused(self, kind: Any, service: str, request: Any) -> Any:
+        """Ask until a refusal comes: one that is given at once is lost where we are found too late."""
+        client = self.node.create_client(kind, service)
+        self.until(client.service_is_ready)
+        answers, asked = [], -math.inf
+
+        def answered() -> bool:
+            nonlocal asked
+            if time.monotonic() > asked + ASKED_AGAIN:
+                asked = time.monotonic()
+                answers.append(client.call_async(request))
+            return any(each.done() for each in answers)
+
+        self.until(answered)
+        return next(each.result() for each in answers if each.done())
 
     def diagnosed(self) -> list[Found]:
         """Return what each message said of the table once there was a diagnosis."""
@@ -105,13 +122,13 @@ def test_the_next_experiment_is_run_and_the_odds_change(user: User) -> None:
     draws = MASS + 0.2 * np.random.default_rng(0).normal(size=(1, 100, 1))
     user.models.publish(models_to_msg([Posterior("table", "free", ("mass",), draws)], Time()))
     user.until(user.models.get_subscription_count)
-    nothing_yet = user.call(Trigger, "/run_next_experiment", Trigger.Request())
+    nothing_yet = user.refused(Trigger, "/run_next_experiment", Trigger.Request())
     assert not nothing_yet.success and "nothing is to be told apart" in nothing_yet.message
     streams = ("/wrist_ft/left", "/ar_tags/table/pose", "/ar_tags/left_gripper/pose", "/grasps", "/scene")
     user.until(lambda: all(user.node.count_subscribers(topic) for topic in streams))
 
     nowhere = PushObject.Request(object="chair", direction=Vector3(x=1.0), speed=0.1, duration=2.0)
-    refused = user.call(PushObject, "/push", nowhere)
+    refused = user.refused(PushObject, "/push", nowhere)
     assert not refused.success and "chair" in refused.message
     first = PushObject.Request(
         object="table", contact_point=Point(x=-0.35), direction=Vector3(x=1.0, y=0.4), speed=0.06, duration=4.0

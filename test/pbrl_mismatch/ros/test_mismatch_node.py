@@ -114,10 +114,10 @@ def at_hand(monkeypatch: pytest.MonkeyPatch) -> AtHand:
 
 
 @pytest.fixture
-def graph(monkeypatch: pytest.MonkeyPatch, at_hand: AtHand) -> Iterator[Graph]:
+def graph(monkeypatch: pytest.MonkeyPatch, at_hand: AtHand, domain: int) -> Iterator[Graph]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     context = Context()
-    rclpy.init(context=context, domain_id=1 + (os.getpid() + 11) % 200)
+    rclpy.init(context=context, domain_id=domain)
     graph = Graph(context)
     yield graph
     graph.close()
@@ -144,20 +144,17 @@ def test_an_alarm_comes_at_once_and_the_diagnosis_later(
 
 
 @pytest.mark.parametrize("argument", ["false_alarm:=2.0", "keeps:=10.0"])
-def test_errors_at_start_are_one_line_and_exit_code_two(argument: str) -> None:
+def test_errors_at_start_are_one_line_and_exit_code_two(argument: str, domain: int) -> None:
     command = [sys.executable, "-m", "pbrl_mismatch.ros.mismatch_node", "--ros-args", "-p", argument]
-    domain = {"ROS_DOMAIN_ID": str(1 + (os.getpid() + 13) % 200), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    done = subprocess.run(command, env=os.environ | domain, capture_output=True, text=True, timeout=120, check=False)
+    alone = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    done = subprocess.run(command, env=os.environ | alone, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1 and done.stderr.startswith("mismatch_node: ")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_without_a_word(number: signal.Signals, tmp_path: Path) -> None:
-    environment = os.environ | {
-        "ROS_DOMAIN_ID": str(1 + (os.getpid() + 15) % 200),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-    }
+def test_a_signal_ends_it_without_a_word(number: signal.Signals, domain: int) -> None:
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     command = [sys.executable, "-c", STARTED]
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -85,10 +85,10 @@ class Graph:
 
 
 @pytest.fixture
-def graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[Graph]:
+def graph(monkeypatch: pytest.MonkeyPatch, domain: int) -> Iterator[Graph]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     context = Context()
-    rclpy.init(context=context, domain_id=1 + (os.getpid() + 7) % 200)
+    rclpy.init(context=context, domain_id=domain)
     graph = Graph(context)
     yield graph
     graph.close()
@@ -185,9 +185,9 @@ def test_a_signal_ends_a_fit(graph: Graph, monkeypatch: pytest.MonkeyPatch, numb
 @pytest.mark.parametrize(
     "argument", ["priors:=no/such/priors.yaml", "max_draws:=0", "max_draws:=many", "max_drows:=10"]
 )
-def test_errors_at_start_are_one_line_and_exit_code_two(argument: str) -> None:
+def test_errors_at_start_are_one_line_and_exit_code_two(argument: str, domain: int) -> None:
     command = [sys.executable, "-m", "pbrl_model.ros.model_node", "--ros-args", "-p", argument]
-    domain = {"ROS_DOMAIN_ID": str(1 + (os.getpid() + 9) % 200), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    done = subprocess.run(command, env=os.environ | domain, capture_output=True, text=True, timeout=60, check=False)
+    alone = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    done = subprocess.run(command, env=os.environ | alone, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1 and done.stderr.startswith("model_node: ")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import threading
 import time
 from collections.abc import Iterator
@@ -83,9 +82,9 @@ def test_a_lens_that_opencv_does_not_model_is_refused():
 
 
 @pytest.fixture
-def context() -> Iterator[Context]:
+def context(domain: int) -> Iterator[Context]:
     made = Context()
-    rclpy.init(context=made, domain_id=100 + os.getpid() % 100)
+    rclpy.init(context=made, domain_id=domain)
     yield made
     made.try_shutdown()
 
