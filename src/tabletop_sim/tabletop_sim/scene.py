@@ -17,6 +17,7 @@ from shapely.affinity import rotate, translate
 
 from bullet_sim.camera_settings import CameraSettings
 from bullet_sim.errors import SimError, nearest
+from bullet_sim.faults import Faults
 from bullet_sim.settings import NonNegative, Settings, Vector3, read_settings
 from tabletop_sim.catalogue import DeskItem
 
@@ -71,6 +72,7 @@ class DeskScene(Settings):
         items: what stands on it, by name.
         arm: (x, y, theta) of the arm's column [m, rad].
         vision: how items are seen.
+        faults: links and clocks that fail on purpose.
     """
 
     name: str = "desk"
@@ -78,6 +80,7 @@ class DeskScene(Settings):
     items: dict[str, DeskItem] = Field(min_length=1)
     arm: Vector3 = (0.0, -0.45, 1.5707963267948966)
     vision: VisionSettings = VisionSettings()
+    faults: Faults = Faults()
 
     @model_validator(mode="after")
     def _stand_apart(self) -> Self:

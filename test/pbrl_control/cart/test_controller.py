@@ -285,7 +285,7 @@ def test_arms_that_cannot_follow_hold_the_base_back() -> None:
     runs = {}
     for name, given in (("weak", arms), ("strong", dataclasses.replace(arms, speed=100.0 * speed))):
         controller, world = made(PATHS["articulated"], noise=np.zeros(4))
-        ticks = drive(controller, world, FLOOR, 60.0, lambda w, given=given: {"arms": given})
+        ticks = drive(controller, world, FLOOR, 60.0, lambda w, given=given: {"arms": given, "arms_time": w.now})
         assert ticks[-1].command.status is DriveStatus.ARRIVED
         assert all((np.abs(tick.command.joint_rates) <= given.speed + 1e-9).all() for tick in ticks)
         off = np.array([tick.state - tick.command.goal for tick in ticks])

@@ -9,6 +9,7 @@ import pytest
 from cart_cases import SETTINGS, Costs, arc, assert_within_limits, drive, made, open_floor, pr2_body, straight
 
 from pbrl_control.cart import (
+    ArmState,
     CartController,
     CartPlan,
     CartSettings,
@@ -20,23 +21,34 @@ from pbrl_control.errors import ControlError
 FLOOR = open_floor()
 
 
-@pytest.mark.parametrize("heading", [0.0, 0.6])
-def test_a_laser_that_falls_silent_stops_it_within_0_3_s_of_the_last_scan(heading: float) -> None:
-    for path in (straight(2.5, heading), arc(1.0, 1.5, 0.5)):
+FULL = np.ones((2, 7))
+ARMS = ArmState(np.tile(np.eye(6, 7), (2, 1, 1)), 0.0 * FULL, -1e3 * FULL, 1e3 * FULL, 1e3 * FULL)
+
+
+@pytest.mark.parametrize(
+    ("stream", "cause"),
+    [
+        ("scan_time", Cause.SCAN),
+        ("pose_time", Cause.POSE),
+        ("articulation_time", Cause.ARTICULATION),
+        ("arms_time", Cause.JOINTS),
+    ],
+)
+def test_a_stream_that_falls_silent_stops_it_within_0_3_s_of_its_last_message(stream: str, cause: Cause) -> None:
+    for path in (straight(2.5), straight(2.5, 0.6), arc(1.0, 1.5, 0.5)):
         controller, world = made(path)
         silent = {}
 
-        def scans(w: object, silent: dict = silent) -> dict:
-            if w.now >= 2.0:
-                return {"scan_time": silent.setdefault("last", w.now - 0.03)}
-            return {"scan_time": w.now - 0.03}
+        def streams(w: object, silent: dict = silent) -> dict:
+            given = {"arms": ARMS, "arms_time": w.now - 0.03, "scan_time": w.now - 0.03}
+            return given if w.now < 2.0 else given | {stream: silent.setdefault("last", w.now - 0.03)}
 
-        ticks = drive(controller, world, FLOOR, 3.0, scans)
+        ticks = drive(controller, world, FLOOR, 3.0, streams)
         assert max(np.abs(tick.sent).max() for tick in ticks) > 0.2
         late = [tick for tick in ticks if tick.now >= silent["last"] + 0.3]
         assert not np.any([tick.sent for tick in late])
         assert np.abs(late[1].rates).max() < 0.02, "but for the lag of the drives"
-        assert late[-1].command.status is DriveStatus.WAITING and late[-1].command.cause is Cause.SCAN
+        assert late[-1].command.status is DriveStatus.WAITING and late[-1].command.cause is cause
         assert_within_limits(ticks, SETTINGS.limits)
 
 
@@ -52,11 +64,16 @@ def test_a_laser_that_falls_silent_stops_it_within_0_3_s_of_the_last_scan(headin
         ({"articulation_time": -1.0}, Cause.ARTICULATION),
         ({"scan_time": -math.inf}, Cause.SCAN),
         ({"scan_time": math.nan}, Cause.SCAN),
+        ({"arms_time": -1.0}, Cause.JOINTS),
+        ({"arms_time": math.nan}, Cause.JOINTS),
     ],
 )
 def test_percepts_that_are_old_or_no_numbers_stop_it_until_they_are_good_again(change: dict, cause: Cause) -> None:
+    def good(w: object) -> dict:
+        return {"arms": ARMS, "arms_time": w.now - 0.02}
+
     controller, world = made(straight(1.0))
-    ticks = drive(controller, world, FLOOR, 20.0, lambda w: change if 1.5 <= w.now < 2.5 else {})
+    ticks = drive(controller, world, FLOOR, 20.0, lambda w: good(w) | (change if 1.5 <= w.now < 2.5 else {}))
     bad = [tick for tick in ticks if 1.5 <= tick.now < 2.5]
     assert {tick.command.status for tick in bad} == {DriveStatus.WAITING}
     assert {tick.command.cause for tick in bad} == {cause}

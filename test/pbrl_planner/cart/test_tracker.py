@@ -47,8 +47,11 @@ def test_own_outlines_are_where_robot_and_cart_are() -> None:
     tracker.grasps({"left": "cart", "right": "cart"})
     reach = np.concatenate(tracker.own(1.0))
     assert reach[:, 1].max() == pytest.approx(2.0 + GRIP[0] + 1.0, abs=0.02), "the cart lies ahead, which is up"
+    unseen = np.concatenate(tracker.own(2.0))
+    assert unseen[:, 1].max() == pytest.approx(reach[:, 1].max()), "what is held is where it was last seen"
+    tracker.grasps({})
     alone = np.concatenate(tracker.own(2.0))
-    assert alone[:, 1].max() < 2.4, "where the cart is is not known any more"
+    assert alone[:, 1].max() < 2.4, "where a cart is that was let go is not known any more"
 
 
 def test_the_checkerboard_serves_while_the_hands_are_silent() -> None:

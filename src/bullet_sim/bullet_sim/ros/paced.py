@@ -102,15 +102,27 @@ class PacedSimulator(Node):
         lag = "at a rate other than 1: simulated seconds to run on after a command before waiting for the next"
         self._lag: float = declare(self, "command_lag", 0.02, lag, (0.0, 1.0))
 
-    def start(self, session: Session, types: dict[str, Callable[[], Any]], latched: Sequence[str] = LATCHED) -> None:
+    def start(
+        self,
+        session: Session,
+        types: dict[str, Callable[[], Any]],
+        faults: Faults,
+        seed: int,
+        latched: Sequence[str] = LATCHED,
+    ) -> None:
         """Offer the topics of a session.
 
         Args:
             session: the run.
             types: message class by topic that it publishes.
+            faults: of the scene: messages and clocks that fail.
+            seed: of every draw of those.
             latched: topics whose last message late subscribers get too.
         """
         self._session = session
+        if faults.any:
+            self._faulty = FaultyLinks(faults, np.random.default_rng(seed))
+            self.get_logger().warning("faults are injected: messages or clocks fail on purpose, as the scene has it")
         self._outputs = {
             topic: self.create_publisher(kind, relative(topic), _quality(topic, latched))
             for topic, kind in types.items()
@@ -142,12 +154,6 @@ class PacedSimulator(Node):
                 self._faulty.send(self._session.time, f"/{topic}", message)
 
         self.create_subscription(kind, topic, heard, COMMAND_QOS)
-
-    def fail(self, faults: Faults, seed: int) -> None:
-        """Let messages and clocks fail as a scene has it; `seed` of every draw."""
-        if faults.any:
-            self._faulty = FaultyLinks(faults, np.random.default_rng(seed))
-            self.get_logger().warning("faults are injected: messages or clocks fail on purpose, as the scene has it")
 
     def _obey(self, command: Callable[[Any], None], message: Any) -> None:
         self._heard += 1

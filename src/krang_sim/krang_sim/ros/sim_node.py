@@ -6,7 +6,6 @@ Its pace is that of `bullet_sim.ros.paced`. Runs that must be bit for bit the sa
 
 from __future__ import annotations
 
-import math
 import threading
 from pathlib import Path
 from typing import get_args
@@ -14,6 +13,7 @@ from typing import get_args
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64MultiArray
 
+from bullet_sim.ros.commands import base_twist
 from bullet_sim.ros.paced import PacedSimulator
 from bullet_sim.ros.parameters import declare, refuse_unknown
 from bullet_sim.ros.running import run_node
@@ -37,8 +37,7 @@ class SimNode(PacedSimulator):
         super().__init__("sim_node", stop)
         scene, seed, gui = self._declare()
         self.session = KrangSession(scene, seed=seed, gui=gui)
-        self.start(self.session, message_types(self.session.tagged, self.session.cameras))
-        self.fail(scene.faults, seed)
+        self.start(self.session, message_types(self.session.tagged, self.session.cameras), scene.faults, seed)
         self.obey_arms(self.session)
         self.listen(Twist, "cmd_vel", self._command_base)
         self.listen(Float64MultiArray, "body_velocity_controller/commands", self._command_body)
@@ -57,11 +56,8 @@ class SimNode(PacedSimulator):
         return with_tags(loaded, tags) if tags else loaded, seed, gui
 
     def _command_base(self, message: Twist) -> None:
-        linear, angular = message.linear, message.angular
-        numbers = (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
-        if not all(map(math.isfinite, numbers)):  # whoever sends these is not to be believed in the others either
-            raise KrangError(f"base command: expected finite numbers, got {list(numbers)}; send zeros to stop")
-        self.session.command_base(linear.x, angular.z)
+        forward, _, turning = base_twist(message)
+        self.session.command_base(forward, turning)
         if self.session.halted:
             self.get_logger().warning(self.session.halted, throttle_duration_sec=1.0)
 

@@ -64,7 +64,7 @@ class CartSenses:
         if pose is None or self._arms is None or self._joints is None or not self._sights:
             return None
         self.local.recentre(float(pose[0]), float(pose[1]))
-        chosen = sight or max(self._sights.values(), key=lambda each: each.time)
+        chosen = sight or self._newest()
         return CartPercept(
             pose,
             # The pose is led on by odometry's twist, for less than 20 ms.
@@ -78,6 +78,7 @@ class CartSenses:
             chosen.misfit,
             chosen.grip_offset(GRIP),
             self._arms.state(self._joints.names, self._joints.position),
+            self._joints.time,
         )
 
     def state(self, now: float) -> Array | None:
@@ -104,11 +105,17 @@ class CartSenses:
         """Take out of both costmaps what nobody has seen for so long [s]: who stood there may have walked on."""
         return [each.clear_unseen(now, age) for each in (self.local, self.whole) if each is not None]
 
+    def _newest(self) -> CartSight:
+        """Return the newest reading of the cart, however old."""
+        return max(self._sights.values(), key=lambda each: each.time)
+
     def _own(self, time: float) -> list[Array]:
         """Return outlines of robot and cart in `map` at a time [s]; none where nothing is known of them."""
         pose, sight = self.whereabouts.pose(time), self.sight(time)
         if pose is None or self.body is None:
             return []
+        if sight is None and self._held and self._sights:
+            sight = self._newest()
         return self.body.seen_outlines(pose, None if sight is None else sight.pose)
 
     @hear.register

@@ -27,6 +27,7 @@ COMFORT = 0.5  # of the braking limits, with which it stops before what it sees 
 QUICKEST = 4.0  # [1/s] at which the goal's pace grows at most
 CREEPING = 0.05  # pace below which there is no progress
 ROUNDING = 1e-6  # of a pace
+USUAL_AGE = 0.05  # [s] of poses and joints that come as they should: a link is lost when the next would have come
 STILL = 0.02  # [m/s, rad/s] standing
 WINDOW = 0.5  # [s] of the plan about the goal in which it is looked for after a stop, and where a plan is joined
 
@@ -113,9 +114,9 @@ class CartController:
             )
             return self._end(now, dt, percept, DriveStatus.REPLAN, Cause.OFF_PLAN, words, here)
         ahead = self._guard.ahead(plan, self._time, percept.costs)
-        speeds = self._speeds(now, percept)
+        speeds, oldest = self._speeds(now, percept)
         here_rates = np.maximum(plan.rates(self._time, settings.period), 1e-9)
-        pace, cause = self._wished_pace(off, ahead, speeds, here_rates)
+        pace, cause = self._wished_pace(off, ahead, speeds, oldest, here_rates)
         pace = self._changed_pace(pace, here_rates, dt)
         step = max(dt, SHORTEST_PERIOD)
         towards = min(self._time + pace * step, plan.duration)
@@ -134,18 +135,22 @@ class CartController:
         status, cause, reason = self._judged(now, off, rates, cause, ahead, percept)
         return self._command(now, dt, percept, rates, status, cause, reason, goal, error, ahead.clearance)
 
-    def _speeds(self, now: float, percept: CartPercept) -> Array:
-        """Return the greatest speeds (3,) from which it stands in time if no scan comes any more."""
+    def _speeds(self, now: float, percept: CartPercept) -> tuple[Array, Cause]:
+        """Return the greatest speeds (3,) from which it stands in time if no more comes of the oldest stream; which."""
         settings = self.settings
-        left = settings.stop_within - (now - percept.scan_time) - settings.period - settings.delay
-        return np.minimum(self._limits.speeds, self._limits.brakings * max(left, 0.0))
+        late = {cause: now - time - (0.0 if cause is Cause.SCAN else USUAL_AGE) for cause, _, time in percept.streams}
+        cause = max(late, key=late.__getitem__)
+        left = settings.stop_within - late[cause] - settings.period - settings.delay
+        return np.minimum(self._limits.speeds, self._limits.brakings * max(left, 0.0)), cause
 
-    def _wished_pace(self, off: tuple[float, float], ahead: Ahead, speeds: Array, rates: Array) -> tuple[float, Cause]:
+    def _wished_pace(
+        self, off: tuple[float, float], ahead: Ahead, speeds: Array, oldest: Cause, rates: Array
+    ) -> tuple[float, Cause]:
         """Return the share of the plan's speed that the goal may have, and why it is not all of it."""
         settings = self.settings
         found = [(1.0, Cause.NONE)]
         # At the limit itself rounding must not look like an old scan.
-        found.append((float((speeds / rates).min()) + ROUNDING, Cause.SCAN))
+        found.append((float((speeds / rates).min()) + ROUNDING, oldest))
         lag = max(off[0] / settings.slow_error, off[1] / settings.slow_angle)
         found.append((1.5 - 0.5 * lag, Cause.LAG))
         found.append((self._arms_share, Cause.ARMS))

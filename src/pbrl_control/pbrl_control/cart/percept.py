@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -56,6 +57,7 @@ class Cause(StrEnum):
     SCAN = "the last scan is old"
     POSE = "the pose of the base is old or no pose"
     ARTICULATION = "the pose of the cart is old or no pose"
+    JOINTS = "the joints' positions are old"
     GRIP = "a hand has lost the cart"
     ARMS = "the arms cannot do it"
     LAG = "base or cart are behind"
@@ -79,6 +81,7 @@ class CartPercept:
         misfit: by which the hands' distance differs from that of what they hold [m]; not a number: cannot be told.
         grip_offset: (2,) from where the grip should be to where it is, in `base` [m].
         arms: joints and Jacobians of both arms; None: nobody wants joint rates.
+        arms_time: of the joints [s], where there are any.
     """
 
     pose: Array | None
@@ -92,6 +95,18 @@ class CartPercept:
     misfit: float = 0.0
     grip_offset: tuple[float, float] = (0.0, 0.0)
     arms: ArmState | None = None
+    arms_time: float = math.nan
+
+    @property
+    def streams(self) -> tuple[tuple[Cause, str, float], ...]:
+        """Return what comes again and again: the cause to wait when it does not, its name, of when the last is [s]."""
+        joints = () if self.arms is None else ((Cause.JOINTS, "joints", self.arms_time),)
+        return (
+            (Cause.POSE, "pose of the base", self.pose_time),
+            (Cause.ARTICULATION, "pose of the cart", self.articulation_time),
+            (Cause.SCAN, "laser", self.scan_time),
+            *joints,
+        )
 
 
 @dataclass(frozen=True)

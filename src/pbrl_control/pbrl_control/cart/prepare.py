@@ -34,4 +34,4 @@ def compile_kernels(settings: CartSettings) -> None:
     arms = ArmState(np.ones((2, 6, 7)), 0.0 * full, -full, full, full)
     controller = CartController(plan, body, settings)
     for now in (0.0, settings.period):
-        controller.step(now, CartPercept(np.zeros(3), now, 0.0, 0.0, now, now, floor, arms=arms))
+        controller.step(now, CartPercept(np.zeros(3), now, 0.0, 0.0, now, now, floor, arms=arms, arms_time=now))

@@ -101,10 +101,11 @@ class CartSettings(Section):
         keep: [m] kept from what is in the way: so far some corner would still go before something is touched. Whoever
             stands there needs room to turn round.
         unknown_blocks: whether cells that nobody saw are not to be entered, those outside of the costmap among them.
-        stop_within: time after the last scan in which the robot stands, whatever its speed [s].
+        stop_within: time after the last message of a stream in which the robot stands, whatever its speed [s].
         scan_age: of the last scan at which the robot waits [s].
         pose_age: of the base's pose [s].
         articulation_age: of the cart's pose in the robot's frame [s].
+        joints_age: of the joints' positions, by which the arms are led [s].
         misfit: by which the hands' distance may differ from that of what they hold [m].
         grip_gain: of bringing the cart back to the grip's place, K of (13) [1/s].
         grip_off: distance from there at which the cart is not where it is held [m].
@@ -133,6 +134,7 @@ class CartSettings(Section):
     scan_age: Positive = 0.15
     pose_age: Positive = 0.15
     articulation_age: Positive = 0.3
+    joints_age: Positive = 0.15
     misfit: Positive = 0.03
     grip_gain: NotNegative = 1.0
     grip_off: Positive = 0.08

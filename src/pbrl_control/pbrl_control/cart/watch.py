@@ -37,12 +37,14 @@ def stale_fault(percept: CartPercept, now: float, settings: CartSettings) -> tup
         return Cause.POSE, "pose of the base: expected finite x, y, theta, got none"
     if angle is None or not math.isfinite(angle):
         return Cause.ARTICULATION, "pose of the cart: expected a finite articulation, got none"
-    for cause, what, time, most in (
-        (Cause.POSE, "pose of the base", percept.pose_time, settings.pose_age),
-        (Cause.ARTICULATION, "pose of the cart", percept.articulation_time, settings.articulation_age),
-        (Cause.SCAN, "laser", percept.scan_time, settings.scan_age),
-    ):
-        age = now - time
+    ages = {
+        Cause.POSE: settings.pose_age,
+        Cause.ARTICULATION: settings.articulation_age,
+        Cause.SCAN: settings.scan_age,
+        Cause.JOINTS: settings.joints_age,
+    }
+    for cause, what, time in percept.streams:
+        age, most = now - time, ages[cause]
         if not 0.0 <= age <= most:
             return cause, f"{what}: expected one at most {most:g} s old, the last is {age:.2f} s old"
     return Cause.NONE, ""

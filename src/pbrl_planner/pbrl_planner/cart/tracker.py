@@ -110,7 +110,8 @@ class CartTracker:
             return []
         if self.body is None:
             return [ALONE @ rotation(float(pose[2])).T + pose[:2]]
-        sight = self.sight(now)
+        # What is held is where it was last seen: nobody sees it for a while, and lasers go on seeing it.
+        sight = self.sight(now) or (self.last_sight() if self.held else None)
         return self.body.seen_outlines(pose, None if sight is None else sight.pose)
 
     @property
@@ -134,6 +135,11 @@ class CartTracker:
             return None
         time, pose = self._seen[source]
         return CartSight(time, source, compose(pose, frame_at_grip(self.cart)))
+
+
+def up_to(now: float, time: float) -> float:
+    """Return a stamp [s]; `now`, where it is a little ahead of it."""
+    return now if now < time <= now + AHEAD else time
 
 
 def grip_offset(sight: CartSight) -> tuple[float, float]:

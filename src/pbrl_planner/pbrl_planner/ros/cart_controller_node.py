@@ -1,9 +1,10 @@
 """The cart's local controller as a node: the action /follow_cart_path; /cmd_vel and both arms' velocities out.
 
 It ticks 20 times a second of the node's clock, on the newest /local_costmap/costmap, and commands only while there is a
-path. When the laser is silent the costmap gets old, and robot and cart stand within `stop_within` of the last scan;
-before what is in the way they stand, too, and after `patience` the path is given up, so that it can be planned again.
-When a hand loses the cart everything stops, and the result says so. /cart_controller/status says what it is at.
+path. When the laser is silent the costmap gets old; when it is, or any other stream, robot and cart stand within
+`stop_within` of its last message; before what is in the way they stand, too, and after `patience` the path is given up,
+so that it can be planned again. When a hand loses the cart everything stops, and the result says so.
+/cart_controller/status says what it is at.
 """
 
 from __future__ import annotations
@@ -32,10 +33,10 @@ from pbrl_control.cart import (
 from pbrl_control.errors import ControlError
 from pbrl_control.planar import Array
 from pbrl_control.pr2_arms import Pr2Arms
-from pbrl_control.ros.conversions import arm_to_msg
+from pbrl_control.ros.conversions import arm_to_msg, seconds
 from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
 from pbrl_planner.cart.leg import Drove
-from pbrl_planner.cart.tracker import CartTracker, grip_offset
+from pbrl_planner.cart.tracker import CartTracker, grip_offset, up_to
 from pbrl_planner.costmap import CostField
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.ros.conversions import field_from_msg, path_from_msg
@@ -183,6 +184,7 @@ class CartControllerNode(Node):
             seen.misfit,
             grip_offset(seen),
             self._arms.state(self._joints.name, self._joints.position),
+            up_to(now, seconds(self._joints.header.stamp)),
         )
 
     def _wait(self, now: float) -> None:

@@ -12,6 +12,7 @@ from typing import get_args
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64MultiArray
 
+from bullet_sim.ros.commands import base_twist
 from bullet_sim.ros.paced import PacedSimulator
 from bullet_sim.ros.parameters import declare, refuse_unknown
 from bullet_sim.ros.running import run_node
@@ -36,7 +37,7 @@ class SimNode(PacedSimulator):
         super().__init__("sim_node", stop)
         scene, seed, gui = self._declare()
         self.session = Pr2Session(scene, seed=seed, gui=gui)
-        self.start(self.session, MESSAGE_TYPES, LATCHED)
+        self.start(self.session, MESSAGE_TYPES, scene.faults, seed, LATCHED)
         self.obey_arms(self.session)
         self.listen(Twist, "cmd_vel", self._command_base)
         self.listen(Float64MultiArray, "torso_velocity_controller/commands", self._command_torso)
@@ -55,7 +56,7 @@ class SimNode(PacedSimulator):
         return with_board(loaded, board) if board else loaded, seed, gui
 
     def _command_base(self, message: Twist) -> None:
-        self.session.command_base(message.linear.x, message.linear.y, message.angular.z)
+        self.session.command_base(*base_twist(message))
 
     def _command_torso(self, message: Float64MultiArray) -> None:
         if len(message.data) != 1:

@@ -35,7 +35,7 @@ class SimNode(PacedSimulator):
         super().__init__("sim_node", stop)
         scene, seed, gui = self._declare()
         self.session = DeskSession(scene, seed=seed, gui=gui)
-        self.start(self.session, message_types(scene), LATCHED)
+        self.start(self.session, message_types(scene), scene.faults, seed, LATCHED)
         self.listen(Float64MultiArray, COMMANDS, lambda message: self.session.command_joints(message.data))
 
     def _declare(self) -> tuple[DeskScene, int, bool]:
