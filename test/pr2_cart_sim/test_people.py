@@ -83,6 +83,30 @@ def test_manners_decide_how_near_they_come(client, social):
     assert gap == pytest.approx(0.40 if social else 0.01, abs=0.011)
 
 
+@pytest.mark.parametrize("room", [True, False])
+def test_who_is_backed_up_to_steps_back_where_there_is_room(client, room):
+    one = walker(client, Person(route=((0.0, 0.0), (0.001, 0.0)), speed=1.0, pause=1e3), social=True)
+    one.place, behind, gaps = np.array([0.0, 0.0]), 0.6, []
+    for _ in range(400):
+        behind -= 0.3 * TICK
+        gap = behind - float(one.place[0])
+        gaps.append(gap)
+        one.move(Nearness(gap, (1.0, 0.0)), lambda way: room)
+    assert (min(gaps) > 0.19) == room
+    assert (one.place[0] < -0.5) == room
+
+
+def test_who_stands_beside_a_cart_that_does_not_pass_gives_it_room_and_walks_on(client):
+    """Both ways along the corridor lead a little towards the cart, 0.15 m to the side: they waited for each other."""
+    one = walker(client, Person(route=((-2.0, 0.1), (2.0, 0.1)), speed=1.0, pause=1e3), social=True)
+    one.place, one._next = np.array([0.0, 0.0]), 1
+    for _ in range(400):
+        gap = float(np.hypot(max(abs(one.place[0]) - 0.5, 0.0), 0.15 - one.place[1]))
+        towards = np.array([np.clip(one.place[0], -0.5, 0.5), 0.15]) - one.place
+        one.move(Nearness(gap, tuple(towards / gap)))
+    assert one.place[0] == pytest.approx(2.0, abs=0.06)
+
+
 def test_they_go_away_from_what_is_near(client):
     one = walker(client, Person(route=((0.0, 0.0), (5.0, 0.0)), speed=1.0, pause=0.0))
     one.place, one._next = np.array([1.0, 0.0]), 1
@@ -134,7 +158,8 @@ def test_adding_somebody_changes_nobody_else(client):
 
 
 def test_the_cart_that_is_driven_into_somebody_is_a_contact(make_scene, make_session, run):
-    session = make_session(make_scene(people={"ann": {"route": [[1.9, 0.0]], "legs": True}}))
+    ann = {"route": [[1.9, 0.0]], "legs": True}
+    session = make_session(make_scene(people={"ann": ann}, manners={"social": False}))
     run(session, 0.8, lambda: session.command_base(0.4, 0.0, 0.0))
     contact = session.contacts[0]
     assert (contact.mover, contact.other, contact.person) == ("cart", "ann", True)

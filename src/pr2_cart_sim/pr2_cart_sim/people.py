@@ -1,14 +1,16 @@
 """People who walk along their routes, rest at the ends, and now and then step in front of the robot.
 
 What a person does is drawn from a generator of their own, so that adding somebody changes nobody else. They walk
-through each other and through furniture that their route crosses; before robot and cart they stop.
+through each other and through furniture that their route crosses; before robot and cart they stop, and step back where
+those come close.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.random import Generator
@@ -28,7 +30,7 @@ TOUCH = 0.01
 """[m] from the robot at which somebody without manners stands, too."""
 PAST, ROOM = 0.4, 0.5
 """Cosine of the angle between somebody's way and the nearest of robot and cart below which it leads past; and the share
-of their margin that has to be left for that."""
+of their margin that has to be left for that. Where less is left, they step back."""
 TURNING = 4.0
 """Rate [rad/s] at which people turn."""
 ARRIVED = 0.05
@@ -90,8 +92,17 @@ class Walker:
         behind = self._route[max(ahead - 1, 0)]
         return ahead, behind + self._rng.random() * (self._route[ahead] - behind)
 
-    def move(self, near: Nearness | None) -> None:
-        """Live for one tick; `near`: how near robot or cart is, None where it is not."""
+    def move(self, near: Nearness | None, free: Callable[[Array], bool] = lambda way: True) -> None:
+        """Live for one tick.
+
+        Args:
+            near: how near robot or cart is, None where it is not.
+            free: whether there is room for a step in a direction (2,).
+        """
+        away = self._away(near)
+        if away is not None and free(away):
+            self._step(away, self._person.speed * TICK)
+            return
         if self._rest > 0:
             self._rest -= TICK
             self._stand()
@@ -107,11 +118,25 @@ class Walker:
         if self._is_stopped(near, way / distance):
             self._wait()
             return
-        step = min(self._person.speed * TICK, distance)
-        self.place = self.place + step * way / distance
-        self._walked += step
-        self._waited, self._stands, self.speed = 0.0, False, self._person.speed
+        self._waited = 0.0
+        self._step(way / distance, min(self._person.speed * TICK, distance))
+
+    def _step(self, direction: Array, length: float) -> None:
+        self.place = self.place + length * direction
+        self._walked += length
+        self._stands, self.speed = False, self._person.speed
         self._put(1.0)
+
+    def _away(self, near: Nearness | None) -> Array | None:
+        """Return the direction (2,) in which who has manners steps back, as robot or cart come close; None: no need.
+
+        They see a robot that backs up, which has no laser behind; and who stands beside a cart that does not pass them
+        gives it room instead of waiting for it for ever.
+        """
+        if near is None or not self._manners.social or near.distance >= ROOM * self._manners.margin:
+            return None
+        size = math.hypot(*near.direction)
+        return -np.array(near.direction) / size if size > 0.0 else None
 
     def step_in(self, goal: Array) -> None:
         """Go and stand at `goal` (2,) [m] for a while, then come back."""
@@ -142,7 +167,7 @@ class Walker:
         """
         if near is None or near.distance >= (self._manners.margin if self._manners.social else TOUCH):
             return False
-        past = PAST if self._manners.social and near.distance > ROOM * self._manners.margin else 0.0
+        past = PAST if self._manners.social and near.distance >= ROOM * self._manners.margin else 0.0
         return direction[0] * near.direction[0] + direction[1] * near.direction[1] > past
 
     def _wait(self) -> None:
@@ -216,7 +241,7 @@ class Crowd:
         for name, walker in self.walkers.items():
             if lead is not None:
                 self._tempt(walker, self._chance[name], lead)
-            walker.move(near.get(name))
+            walker.move(near.get(name), partial(self._has_room, walker))
 
     def _tempt(self, walker: Walker, rng: Generator, lead: Lead) -> None:
         """Let somebody who is near step in front of a robot that moves, if chance will have it."""
@@ -229,6 +254,14 @@ class Crowd:
         if np.hypot(*(goal - walker.place)) > manners.step_in_within or not self._is_free(walker, goal):
             return
         walker.step_in(goal)
+
+    def _has_room(self, walker: Walker, way: Array) -> bool:
+        """Tell whether nothing stands where somebody's next steps in a direction (2,) lead."""
+        aside = 0.25 * np.array([-way[1], way[0]])
+        offs = (-aside, 0 * aside, aside)
+        starts = [[*(walker.place + 0.3 * way + off), CHEST] for off in offs]
+        ends = [[*(walker.place + 0.5 * way + off), CHEST] for off in offs]
+        return all(hit[0] < 0 for hit in self._api.rayTestBatch(starts, ends))
 
     def _is_free(self, walker: Walker, goal: Array) -> bool:
         """Tell whether nothing stands between somebody and a place, nor close beyond it."""
