@@ -1,4 +1,4 @@
-"""On which kinds of baseline effects are tried: the simplest, the best, and richer ones that are nearly as good."""
+"""On what effects are tried: kinds of baseline, the simplest, the best, and richer ones; then likely other effects."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pbrl_mismatch.search.explain import LED, WORTH_A_KIND, _grounds
+from pbrl_mismatch.search.explain import GROUNDS_OF_SETS, LED, OF_THE_BEST, WORTH_A_KIND, _grounds, _grounds_of_sets
 
 
 def base(parameters: int, evidence: float) -> Any:
@@ -28,3 +28,41 @@ def test_richer_kinds_are_tried_only_where_they_are_worth_it(worse: float, count
     assert len(_grounds([wheel, free])) == count
     assert _grounds([base(3, 0.0), base(8, -1.0)])[0].evidence == 0.0
     assert len(_grounds([base(3, 0.0), base(8, -1.0)])) == 1
+
+
+def weighed(effects: str, evidence: float) -> Any:
+    """Return a hypothesis of effects joined by "+", as it is weighed."""
+    names = tuple(name for name in effects.split("+") if name)
+    fitted = SimpleNamespace(hypothesis=SimpleNamespace(effects=names), evidence=evidence)
+    return SimpleNamespace(effects=names, fitted=fitted)
+
+
+def grounds(entries: tuple[Any, ...], depth: int, *, lacks: bool, pinned: bool = False, patch: Any) -> list[str]:
+    patch.setattr("pbrl_mismatch.search.explain.may_be_pinned", lambda _: pinned)
+    found = _grounds_of_sets(entries, depth, SimpleNamespace(), lacks)
+    return ["+".join(each.hypothesis.effects) for each in found]
+
+
+def test_where_the_likeliest_leaves_something_out_others_may_be_half_of_the_truth(monkeypatch: Any) -> None:
+    names = ["com_offset", "tether", "floor_slope", "viscous_drag", "wrench_bias"]
+    entries = (*(weighed(name, 100.0 - k) for k, name in enumerate(names)), weighed("", 0.0))
+    assert grounds(entries, 1, lacks=True, patch=monkeypatch) == names[:GROUNDS_OF_SETS]
+    assert grounds(entries, 1, lacks=False, patch=monkeypatch) == names[:1]
+
+
+def test_what_explains_little_or_gives_way_is_no_ground(monkeypatch: Any) -> None:
+    little = 0.9 * OF_THE_BEST * 100.0
+    entries = (weighed("tether", 100.0), weighed("grasp_compliance", 90.0), weighed("detent", little), weighed("", 0.0))
+    assert grounds(entries, 1, lacks=True, patch=monkeypatch) == ["tether"]
+
+
+def test_only_hypotheses_of_the_asked_number_of_effects_are_grounds(monkeypatch: Any) -> None:
+    entries = (weighed("tether+detent", 120.0), weighed("tether", 100.0), weighed("detent", 90.0), weighed("", 0.0))
+    assert grounds(entries, 2, lacks=True, patch=monkeypatch) == ["tether+detent"]
+    assert grounds(entries, 1, lacks=True, patch=monkeypatch) == ["tether", "detent"]
+
+
+def test_a_pin_is_a_ground_where_a_place_stood_still(monkeypatch: Any) -> None:
+    entries = (weighed("tether", 100.0), weighed("hidden_hinge", 1.0), weighed("", 0.0))
+    assert grounds(entries, 1, lacks=False, pinned=True, patch=monkeypatch) == ["tether", "hidden_hinge"]
+    assert grounds(entries, 1, lacks=False, pinned=False, patch=monkeypatch) == ["tether"]

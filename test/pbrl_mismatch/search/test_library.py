@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from pbrl_mismatch import DiagnoseOptions, track_of
 from pbrl_mismatch.search.fitted import Fitted, cut_stages, fit_from
 from pbrl_mismatch.search.grip import GripEvidence, GripLaw, beside_motion
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.library import of_every_shape, search_library
+from pbrl_mismatch.search.library import AS_GOOD, _survivors, of_every_shape, search_library
 from pbrl_mismatch.search.weigh import DISCREPANCY, weigh, worth_of_another
 
 FEW = ("viscous_drag", "floor_slope", "wrench_bias")
@@ -63,6 +64,13 @@ def test_what_only_the_grippers_poses_show_is_worth_simulating(
     assert not search_library(np.random.SeedSequence(0), track, [base], stages, options, WORTH)
     found = search_library(np.random.SeedSequence(0), track, [base], stages, options, WORTH, grip)
     assert ("time_offset",) in {each.hypothesis.effects for each in found}
+
+
+def test_of_sets_that_go_on_each_counts_once_in_whatever_order_it_was_found() -> None:
+    sets = [("tether", "detent"), ("detent", "tether"), ("tether", "floor_slope"), ("detent", "viscous_drag")]
+    tried = [SimpleNamespace(effects=effects) for effects in sets]
+    assert _survivors(tried, [50.0, 49.0, 40.0, 30.0], 2, 0.0) == [0, 1, 2]
+    assert _survivors(tried, [50.0, 49.0 - AS_GOOD, 40.0, 30.0], 2, 0.0) == [0, 2], "the worse order is given up"
 
 
 def test_a_contact_goes_on_in_every_shape_where_it_goes_on_at_all() -> None:

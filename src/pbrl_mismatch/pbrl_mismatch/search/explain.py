@@ -28,8 +28,9 @@ from pbrl_mismatch.search.weigh import Weighed, veto, weigh, worth_of_another
 
 Array = NDArray[np.float64]
 
-GROUNDS_OF_SETS = 1
-"""So many of the likeliest hypotheses are tried with one effect more."""
+GROUNDS_OF_SETS, OF_THE_BEST = 3, 0.3
+"""So many of the likeliest hypotheses are tried with one effect more where the likeliest leaves something out: of two
+that act, the likeliest is often a third that stands in for both. Each explains at least this share of what it does."""
 FEWER = {"shortlist": 6, "candidates": 2, "keep": (1, 1)}
 """What is looked at where an effect is laid on another: the ground is nearly right."""
 REACHED = 1.12
@@ -110,14 +111,14 @@ def explain(
     weighed = weigh(bases, tried, options)
     odds = min(_log_odds(singles), _log_odds(weighed))
     for depth in range(1, options.most_together):
-        deepest = _grounds_of_sets([each.fitted for each in weighed if len(each.effects) == depth], track)
         if len(weighed[0].effects) < depth:
             break
-        least = -math.inf
-        if not _lacks(weighed[0].fitted, grip, options):
+        least, lacks = -math.inf, _lacks(weighed[0].fitted, grip, options)
+        if not lacks:
             if len(stages.fitted) < len(options.windows):
                 break  # What is weighed are shorter windows than the path's.
             least = worth_of_another(weighed) + WORTH_A_SET
+        deepest = _grounds_of_sets(weighed, depth, track, lacks)
         fewer = options.model_copy(update=FEWER)
         more = _tried(seeds[depth], track, deepest, stages, grip, fewer, least)
         if not more:
@@ -146,11 +147,18 @@ def _parts_led(best: Fitted, tried: list[Fitted], stages: Stages, options: Diagn
     ]
 
 
-def _grounds_of_sets(likeliest: list[Fitted], track: Track) -> list[Fitted]:
-    """Return the hypotheses that one effect more is tried on: a pin too, where a place stood still."""
-    first, rest = likeliest[:GROUNDS_OF_SETS], likeliest[GROUNDS_OF_SETS:]
-    pins = [each for each in rest if any(EFFECTS[name].pins for name in each.hypothesis.effects)]
-    return first + (pins[:1] if may_be_pinned(track) else [])
+def _grounds_of_sets(weighed: tuple[Weighed, ...], depth: int, track: Track, lacks: bool) -> list[Fitted]:
+    """Return the hypotheses of so many effects that one more is tried on: a pin too, where a place stood still."""
+    none = max(each.fitted.evidence for each in weighed if not each.effects)
+    likeliest = [each.fitted for each in weighed if len(each.effects) == depth]
+    least = none + OF_THE_BEST * (likeliest[0].evidence - none)
+    # A hold that gives way is laid on a motion as it is.
+    others = [
+        each for each in likeliest[1:] if each.evidence > least and GRASP_COMPLIANCE not in each.hypothesis.effects
+    ]
+    chosen = [likeliest[0], *(others[: GROUNDS_OF_SETS - 1] if lacks else [])]
+    pins = [each for each in likeliest if any(EFFECTS[name].pins for name in each.hypothesis.effects)]
+    return chosen + ([each for each in pins[:1] if each not in chosen] if may_be_pinned(track) else [])
 
 
 def _lacks(best: Fitted, grip: GripEvidence | None, options: DiagnoseOptions) -> bool:

@@ -21,7 +21,7 @@ from pbrl_mismatch.search.grip import GripEvidence
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.climb import PathPeak
-from pbrl_mismatch.search.path.ground import ground_of, traced
+from pbrl_mismatch.search.path.ground import Ground, ground_of, traced
 from pbrl_mismatch.search.path.pins import may_be_pinned
 from pbrl_mismatch.search.path.starts import starts_of
 from pbrl_mismatch.search.second import KEPT, is_another, parted_starts
@@ -61,7 +61,7 @@ def search_library(
     Args:
         seed: of every draw.
         track: what was recorded.
-        bases: fitted baselines, or hypotheses that already have effects.
+        bases: fitted baselines, or hypotheses that already have effects, the likeliest first.
         stages: windows.
         options: settings.
         least: where no effect is likelier along the path than what it is laid on by more [nat], none is simulated.
@@ -97,24 +97,28 @@ def search_library(
     with ThreadPoolExecutor(options.workers) as pool:
         begun = list(pool.map(begin, range(len(jobs))))
         laid = [each.hypothesis for each in begun]
-        on_path = [_likeliest(each.hypothesis, each, grip) for each in begun]
-        if least > -math.inf:
-            before_it = {
-                id(base): ground.evidence + (base.beside if grip is not None else 0.0)
-                for base, ground in zip(bases, grounds, strict=True)
-            }
-            gained = [value - before_it[id(base)] for value, (_, _, base, _) in zip(on_path, jobs, strict=True)]
-            if max(gained, default=-math.inf) < least:
-                return []
+        before_it = {id(base): _of_ground(base, ground, grip) for base, ground in zip(bases, grounds, strict=True)}
+        gained = [
+            _likeliest(each.hypothesis, each, grip) - before_it[id(base)]
+            for each, (_, _, base, _) in zip(begun, jobs, strict=True)
+        ]
+        if max(gained, default=-math.inf) < least:
+            return []
+        # What a ground with effects, simulated, knows beyond its path, what is laid on it knows as well.
+        on_path = [
+            gain + (base.evidence if base.hypothesis.effects else before_it[id(base)])
+            for gain, (_, _, base, _) in zip(gained, jobs, strict=True)
+        ]
         stands_in = any(_path_above_simulation(base) > UNTOLD for base in bases)
         most = len(EFFECTS) if stands_in else options.shortlist
         chosen = _survivors(laid, on_path, most, CLOSE[0])
         if min(each.noise_scale for each in begun) > RESTLESS:
             chosen = sorted({*chosen, *(k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].sticks)})
-        pins = [k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].pins and may_be_pinned(longest.track)]
+        asked = [k for k, (_, _, base, _) in enumerate(jobs) if base is bases[0] or not base.hypothesis.effects]
+        pins = [k for k in asked if EFFECTS[jobs[k][0]].pins and may_be_pinned(longest.track)]
         # A pin is so stiff that a path a millimetre off says nothing of it; and the first of two wheels has taken on
         # what both do, so that along its path the second has nothing to explain.
-        chosen = sorted({*chosen, *pins, *(k for k, (name, _, base, _) in enumerate(jobs) if is_another(name, base))})
+        chosen = sorted({*chosen, *pins, *(k for k in asked if is_another(jobs[k][0], jobs[k][2]))})
         chosen = of_every_shape([(name, id(base)) for name, _, base, _ in jobs], chosen)
         running = list(pool.map(begin_simulated, chosen))
         # Short windows rank ways to part a wheel no better than the path does: several go on.
@@ -189,6 +193,11 @@ def _ordered(peak: Peak) -> Peak:
     return peak.take(np.argsort(-peak.evidence, kind="stable"))
 
 
+def _of_ground(base: Fitted, ground: Ground, grip: GripEvidence | None) -> float:
+    """Return the evidence of a ground along its path, with what the grippers' poses say of it [nat]."""
+    return ground.evidence + (base.beside if grip is not None else 0.0)
+
+
 def _likeliest(hypothesis: Hypothesis, peak: Peak | PathPeak, grip: GripEvidence | None) -> float:
     """Return the evidence of the best point of a hypothesis, with what the grippers' poses say of it [nat]."""
     evidence = np.nan_to_num(peak.evidence, nan=-np.inf)
@@ -208,13 +217,11 @@ def _survivors(hypotheses: Sequence[Hypothesis], evidence: Sequence[float], most
         close: others go on that are this near to the likeliest [nat].
     """
     best: dict[tuple[str, ...], float] = {}
-    for hypothesis, value in zip(hypotheses, evidence, strict=True):
-        best[hypothesis.effects] = max(best.get(hypothesis.effects, -np.inf), value)
+    # Two effects are the same two in either order.
+    names = [tuple(sorted(each.effects)) for each in hypotheses]
+    for effects, value in zip(names, evidence, strict=True):
+        best[effects] = max(best.get(effects, -np.inf), value)
     ranked = sorted(best, key=lambda effects: -best[effects])
     # Where all are close, more go on.
     ranked = [name for place, name in enumerate(ranked) if place < most or best[name] > best[ranked[0]] - close]
-    return [
-        k
-        for k, hypothesis in enumerate(hypotheses)
-        if hypothesis.effects in ranked and evidence[k] >= best[hypothesis.effects] - AS_GOOD
-    ]
+    return [k for k, effects in enumerate(names) if effects in ranked and evidence[k] >= best[effects] - AS_GOOD]
