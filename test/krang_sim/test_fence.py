@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from bullet_sim.errors import SimError
+from bullet_sim.fence import CLEAR
 from bullet_sim.known import KEPT_CLEAR, known_scene
 from bullet_sim.scene import Scene
 from bullet_sim.settings import parse_settings
-from krang_sim.fence import CLEAR
 from krang_sim.session import KrangSession
 
 FENCE = [[1.15, -1.0], [1.15, 1.0], [1.5, 0.0]]

@@ -9,16 +9,15 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bullet_sim.client import STEP, BulletClient
 from bullet_sim.errors import SimError
+from bullet_sim.fence import Fence, Watch
 from bullet_sim.scene import Posture as PostureSettings
 from bullet_sim.scene import Scene
 from bullet_sim.window import Window
 from bullet_sim.world import BodyTruth, World
 from krang_sim.commands import CommandWatchdog
-from krang_sim.fence import Fence, Verdict
 from krang_sim.grippers import GraspOutcome, Grippers, no_such_side
 from krang_sim.observations import GraspState, Observation
 from krang_sim.postures import Posture, mirrored, posture
@@ -26,10 +25,6 @@ from krang_sim.robot import BODY_JOINTS, SIDES, Krang
 from krang_sim.sensing import Sensing
 from krang_sim.tag_cameras import ReadTags
 
-START_CLEAR = 0.1
-"""[m] from what is kept out of, at the start."""
-LOOK = 0.01
-"""[s] between two looks of the fence."""
 OVERLAP = 0.005  # [m] a body that reaches further than this into the robot stands in its place
 
 
@@ -74,20 +69,9 @@ class KrangSession:
         self.tagged, self.cameras = self._sensing.tagged, self._sensing.cameras
         self._commands = CommandWatchdog({"base": 2, "left": 7, "right": 7, "body": 2})
         self._grippers = Grippers(self.world, self.robot)
-        self.fence = self._fence_of(scene) if scene.keep_out else None
-        self._allowed, self._looked = Verdict(), -1.0
+        self.fence = Fence(self._client, self.robot, scene, self.world.furniture) if scene.keep_out else None
+        self._watch = Watch(self.fence)
         self._news: list[Observation] = self._sensing.latched()
-
-    def _fence_of(self, scene: Scene) -> Fence:
-        """Return the fence about what may not be entered; raise SimError where the robot reaches into it."""
-        footprints = {name: scene.bodies[name].footprint for name in self.world.furniture}
-        fence = Fence(self._client, self.robot, scene.keep_out, self.world.furniture, footprints)
-        if (near := fence.distance(())) < START_CLEAR:
-            raise SimError(
-                f"keep_out: expected a robot that starts {START_CLEAR} m off at least, got {near:.2f} m; its pose is "
-                f"{list(scene.robot.pose)}"
-            )
-        return fence
 
     def _check_start(self, scene: Scene) -> None:
         """Raise SimError where a body of the scene reaches into the robot."""
@@ -163,7 +147,7 @@ class KrangSession:
         """
         now = self.time
         base = self._commands.current("base", now)
-        allowed = self._fenced(now, base)
+        allowed = self._watch.allowed(now, np.array([base[0], 0.0, base[1]]), self.held)
         self.robot.command_base(*(base if allowed.base else np.zeros(2)))
         for first, group in (
             (BODY_JOINTS[0], "body"),
@@ -179,13 +163,6 @@ class KrangSession:
         news, self._news = self._news, []
         return news + self._sensing.observe(self.time)
 
-    def _fenced(self, now: float, base: NDArray[np.float64]) -> Verdict:
-        """Return what of the commands the fence allows, looked at anew each `LOOK` seconds."""
-        if self.fence is not None and now - self._looked >= LOOK - 1e-9:
-            self._looked = now
-            self._allowed = self.fence.allow(base, self.held)
-        return self._allowed
-
     @property
     def held(self) -> tuple[str, ...]:
         """Names of what the grippers hold."""
@@ -194,10 +171,7 @@ class KrangSession:
     @property
     def halted(self) -> str:
         """Say that the fence holds the robot back, in a sentence; empty where it does not."""
-        if self._allowed.base and self._allowed.joints:
-            return ""
-        what = "arms are" if self._allowed.base else "the robot is"
-        return f"fence: {what} held back at a place that is kept out of; command what leads away"
+        return self._watch.halted
 
     def truth(self, name: str) -> BodyTruth:
         """Give a body's true pose and velocity: for scoring only, never for a topic.

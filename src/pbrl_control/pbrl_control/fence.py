@@ -1,7 +1,7 @@
 """The controller's fence: no part of the robot, nor what it holds, is sent where it may not be.
 
 Who plans keeps clear of such places anyway; this holds whoever does not. The robot's interface has a fence of its own,
-nearer by, see `krang_sim.fence`.
+nearer by, see `bullet_sim.fence`.
 """
 
 from __future__ import annotations

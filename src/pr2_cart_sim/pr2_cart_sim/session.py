@@ -19,6 +19,7 @@ from bullet_sim.clamp import GripperSpec
 from bullet_sim.client import BulletClient
 from bullet_sim.commands import CommandWatchdog
 from bullet_sim.errors import SimError
+from bullet_sim.fence import Fence, Watch
 from bullet_sim.grippers import GraspOutcome, Grippers, no_such_side
 from bullet_sim.observations import GraspState
 from bullet_sim.world import BodyTruth
@@ -40,6 +41,10 @@ STEP = 1 / 200
 TIMEOUT = 0.1
 """Age [s] at which a command no longer counts: two of a controller's that runs at 20 Hz."""
 
+CART_STOPS = 0.45
+"""[s] for which the cart goes on at its speed, as far as it then comes when the base brakes: arms give to 25 kg, most
+where it is swung round."""
+
 FINGERS = GripperSpec(
     plate_start=0.162,
     plate_end=0.198,
@@ -58,6 +63,7 @@ class Pr2Session:
     Attributes:
         office: everything that there is.
         robot: in it.
+        fence: about what may not be entered; None: there is nothing.
     """
 
     def __init__(self, scene: OfficeScene, *, seed: int, gui: bool = False, step: float = STEP) -> None:
@@ -95,6 +101,10 @@ class Pr2Session:
             {"base": 3, "left": 7, "right": 7, "torso": 1, "head": 2}, timeout=TIMEOUT, refusal=Pr2Error
         )
         self._nod = Nod(scene.sensors.tilt_laser)
+        furniture = self.office.world.furniture
+        told = self.office.world.scene
+        self.fence = Fence(self._client, self.robot, told, furniture, CART_STOPS) if scene.keep_out else None
+        self._watch = Watch(self.fence)
         self._news: list[Observation] = self._sensing.latched()
         if scene.robot.holds is not None:
             for side in SIDES:
@@ -167,12 +177,16 @@ class Pr2Session:
             static frames, grasps), stamped zero.
         """
         now, robot, commands = self.time, self.robot, self._commands
-        robot.command_base(*commands.current("base", now), brake=not commands.fresh("base", now))
+        base = commands.current("base", now)
+        allowed = self._watch.allowed(now, base, self.held)
+        held_back = not (allowed.base and commands.fresh("base", now))
+        robot.command_base(*(base if allowed.base else np.zeros(3)), brake=held_back)
         robot.command_joints("torso_lift_joint", commands.current("torso", now))
         robot.command_joints("head_pan_joint", commands.current("head", now))
         robot.command_joints("laser_tilt_mount_joint", [self._nod.rate(float(robot.joint_state()[0][TILT_JOINT]))])
         for side in SIDES:
-            robot.command_joints(ARM_JOINTS[side][0], commands.current(side, now))
+            wanted = commands.current(side, now)
+            robot.command_joints(ARM_JOINTS[side][0], wanted if allowed.joints else np.zeros(len(wanted)))
         robot.drive()
         self._grippers.apply()
         self.office.step()
@@ -180,6 +194,16 @@ class Pr2Session:
             self._tell_grasps()
         news, self._news = self._news, []
         return news + self._sensing.observe(self.time, self._grippers.holds())
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Names of what the grippers hold."""
+        return tuple(hold.object for hold in self._grippers.holds())
+
+    @property
+    def halted(self) -> str:
+        """Say that the fence holds the robot back, in a sentence; empty where it does not."""
+        return self._watch.halted
 
     def truth(self, name: str) -> BodyTruth:
         """Give a body's true pose and velocity: for scoring only, never for a topic.

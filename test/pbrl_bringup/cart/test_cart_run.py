@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 
 from pbrl_bringup.cart_run import run_cart
 from pbrl_bringup.experiments.cart_office_figure import draw
+from pbrl_control.planar import placed
 from pbrl_planner.cart.navigator import Answer
 from pr2_cart_sim.maps import FREE, OCCUPIED, GridMap, save_map
 from pr2_cart_sim.scene import OfficeScene
@@ -59,6 +61,32 @@ def test_a_goal_in_a_wall_is_a_proved_failure_and_it_stays_where_it_is(hall: Off
     assert not done.reached and {call.answer for call in done.calls} == {Answer.GOAL_TAKEN}
     assert len(done.calls) == 2, "it waits and tries again"
     assert done.score.way < 0.01 and "something stands where the goal is" in done.sentence
+
+
+def kept_out(hall: OfficeScene, corners: list[list[float]]) -> OfficeScene:
+    """Return the hall with a place that nothing may enter, where nothing stands."""
+    return OfficeScene.model_validate({**hall.model_dump(), "keep_out": [corners]})
+
+
+def test_round_a_place_that_is_kept_out_of_it_goes_a_way(hall: OfficeScene) -> None:
+    strip = [[3.1, -0.1], [3.3, -0.1], [3.3, 1.35], [3.1, 1.35]]
+    done = run_cart(kept_out(hall, strip), np.array([2.2, 2.0, 0.0]), seed=1, longest=30.0, coarse=True)
+    assert done.reached, done.sentence
+    sizes = {"base": np.array([0.334, 0.334]), "cart": np.array([0.5, 0.275])}
+    signs, place = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]), shapely.Polygon(strip)
+    near = [
+        place.distance(shapely.Polygon(placed(signs * size, np.array(getattr(each, part)))))
+        for each in done.trace
+        for part, size in sizes.items()
+    ]
+    assert 0.05 < min(near) < 0.5
+
+
+def test_beyond_a_place_that_shuts_the_hall_there_is_proved_to_be_no_way(hall: OfficeScene) -> None:
+    strip = [[3.1, -0.1], [3.3, -0.1], [3.3, 3.1], [3.1, 3.1]]
+    done = run_cart(kept_out(hall, strip), np.array([2.2, 2.0, 0.0]), seed=1, longest=2.5, coarse=True)
+    assert not done.reached and {call.answer for call in done.calls} <= {Answer.NO_PATH, Answer.GOAL_TAKEN}
+    assert done.score.way < 0.01
 
 
 @pytest.mark.parametrize(("tilt", "contact"), [({"increment": 0.04}, False), ({"increment": 0.5, "rate": 0.1}, True)])

@@ -134,9 +134,10 @@ class Stage:
         cart.header.frame_id, cart.header.stamp = "base", stamp
         self.send("/cart_pose/hands", cart)
 
-    def tell_cart(self, hands: tuple[str, ...] = ("left", "right")) -> None:
+    def tell_cart(self, hands: tuple[str, ...] = ("left", "right"), *more: Body) -> None:
         footprint = [Point(x=x, y=y) for x, y in CART]
-        self.send("/scene", Scene(bodies=[Body(name="cart", footprint=footprint, height=0.9, movable=True)]), LATCHED)
+        cart = Body(name="cart", footprint=footprint, height=0.9, movable=True)
+        self.send("/scene", Scene(bodies=[cart, *more]), LATCHED)
         self.tell_grasps(hands)
 
     def tell_grasps(self, hands: tuple[str, ...]) -> None:

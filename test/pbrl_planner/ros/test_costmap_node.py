@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Point, Pose2D, TransformStamped
 from nav_msgs.msg import OccupancyGrid
+from pbrl_msgs.msg import Body
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
@@ -92,6 +93,19 @@ def test_an_old_costmap_looks_old(mapping: Mapping) -> None:
     mapping.stage.tick(0.6)
     mapping.stage.until(lambda: len(mapping.whole) > before)
     assert field_from_msg(mapping.whole[-1]).time == pytest.approx(seen)
+
+
+def test_a_place_that_is_kept_out_of_is_lethal_though_nothing_is_seen_there(mapping: Mapping) -> None:
+    x, y = mapping.stage.pose[:2]
+    assert mapping.look().cost(x + 0.4, y + 0.6) < LETHAL
+    square = [Point(x=side_x, y=side_y) for side_x, side_y in ((0.0, 0.0), (0.2, 0.0), (0.2, 0.2), (0.0, 0.2))]
+    place = Body(name="keep_out_0", footprint=square, height=3.0, pose=Pose2D(x=x + 0.3, y=y + 0.5))
+    mapping.stage.tell_cart(("left", "right"), place)
+    mapping.stage.until(lambda: mapping.node.tracker.kept_out)
+    assert mapping.look().cost(x + 0.4, y + 0.6) == LETHAL
+    before = len(mapping.whole)
+    mapping.stage.until(lambda: len(mapping.whole) > before)
+    assert field_from_msg(mapping.whole[-1]).cost(x + 0.4, y + 0.6) == LETHAL
 
 
 def test_what_was_seen_once_can_be_cleared(mapping: Mapping) -> None:

@@ -9,8 +9,10 @@ import numpy as np
 from bullet_sim.observations import GraspState, JointStates, KnownScene, RobotDescription
 from pbrl_control.cart import CartBody, CartPercept, CartSight, choose_sight
 from pbrl_control.cart.whereabouts import Whereabouts
-from pbrl_control.planar import Array, compose, on_floor
+from pbrl_control.fence import TOLD
+from pbrl_control.planar import Array, compose, on_floor, placed
 from pbrl_control.pr2_arms import Pr2Arms
+from pbrl_planner.cart.kept_out import with_kept_out
 from pbrl_planner.cart.outline import GRIP, frame_at_grip, pr2_with
 from pbrl_planner.cart.shoulders import with_shoulders
 from pbrl_planner.costmap import CostField, Costmap, CostmapSettings, EvidenceSettings, RangeScan, Recovery, StaticMap
@@ -53,6 +55,7 @@ class CartSenses:
         self._at_grip: dict[str, Array] = {}
         self._carts: dict[str, Array] = {}
         self._sights: dict[str, CartSight] = {}
+        self._kept_out: list[Array] = []
 
     @singledispatchmethod
     def hear(self, observation: object) -> None:
@@ -73,7 +76,7 @@ class CartSenses:
             0.0,
             chosen.time,
             self.local.time,
-            with_shoulders(self.local.field(now), self._static, self._own(now)),
+            self._marked(self.local, now),
             ("left" in self._held, "right" in self._held),
             chosen.misfit,
             chosen.grip_offset(GRIP),
@@ -93,7 +96,7 @@ class CartSenses:
 
     def floor(self, now: float) -> CostField | None:
         """Return costs of the whole floor at `now` [s]; None: no map has come yet."""
-        return None if self.whole is None else with_shoulders(self.whole.field(now), self._static, self._own(now))
+        return None if self.whole is None else self._marked(self.whole, now)
 
     def recover(self, now: float) -> list[Recovery]:
         """Take out of both costmaps what is marked where robot and cart are, and what was seen too seldom."""
@@ -104,6 +107,10 @@ class CartSenses:
     def forget_unseen(self, now: float, age: float) -> list[Recovery]:
         """Take out of both costmaps what nobody has seen for so long [s]: who stood there may have walked on."""
         return [each.clear_unseen(now, age) for each in (self.local, self.whole) if each is not None]
+
+    def _marked(self, costs: Costmap, now: float) -> CostField:
+        """Return a costmap's field with room for shoulders, and with what nothing may enter."""
+        return with_kept_out(with_shoulders(costs.field(now), self._static, self._own(now)), self._kept_out)
 
     def _newest(self) -> CartSight:
         """Return the newest reading of the cart, however old."""
@@ -127,6 +134,9 @@ class CartSenses:
     def _(self, observation: KnownScene) -> None:
         self.room = observation.room
         self._carts = {body.name: body.footprint for body in observation.bodies if body.movable}
+        self._kept_out = [
+            placed(body.footprint, body.pose) for body in observation.bodies if body.name.startswith(TOLD)
+        ]
 
     @hear.register
     def _(self, observation: KnownMap) -> None:

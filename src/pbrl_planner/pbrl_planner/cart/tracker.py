@@ -33,6 +33,7 @@ class CartTracker:
         body: outlines of robot and cart; None: no hand has held a cart yet.
         cart: outline (k, 2) of that cart in its own frame [m].
         held: what each hand holds, by side.
+        kept_out: outlines (k, 2) of places that nothing may enter [m].
     """
 
     def __init__(self) -> None:
@@ -40,6 +41,7 @@ class CartTracker:
         self.body: CartBody | None = None
         self.cart: Array | None = None
         self.held: dict[str, str] = {}
+        self.kept_out: list[Array] = []
         self._newest = -math.inf
         self._movable: dict[str, Array] = {}
         self._seen: dict[str, tuple[float, Array]] = {}

@@ -24,6 +24,7 @@ from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_control.planar import Array, compose, on_floor
 from pbrl_control.ros.qos import LATCHED, NEWEST
+from pbrl_planner.cart.kept_out import with_kept_out
 from pbrl_planner.cart.shoulders import with_shoulders
 from pbrl_planner.cart.tracker import CartTracker
 from pbrl_planner.costmap import CostField, Costmap, Recovery, StaticMap
@@ -145,7 +146,7 @@ class CostmapNode(Node):
         self._global_out.publish(field_to_msg(field))
 
     def _field(self, costs: Costmap, now: float, own: list[Array]) -> CostField:
-        return with_shoulders(costs.field(now), self._static, own)
+        return with_kept_out(with_shoulders(costs.field(now), self._static, own), self.tracker.kept_out)
 
     def _clear(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         own = self.tracker.own(self._now())

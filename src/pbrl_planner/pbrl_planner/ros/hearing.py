@@ -14,6 +14,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from pbrl_bag.errors import BagError
 from pbrl_bag.geometry import bodies_of_scene
 from pbrl_bag.ros.diagnostics import Diagnostics
+from pbrl_control.fence import TOLD
+from pbrl_control.planar import placed
 from pbrl_control.ros.conversions import seconds
 from pbrl_control.ros.qos import LATCHED
 from pbrl_planner.cart.tracker import SOURCES, CartTracker
@@ -70,6 +72,9 @@ class Hearing:
     def _on_scene(self, message: Scene) -> None:
         known = bodies_of_scene("/scene", message)
         self._tracker.furniture({name: body.footprint for name, body in known.items() if body.movable})
+        self._tracker.kept_out = [
+            placed(body.footprint, body.pose) for name, body in known.items() if name.startswith(TOLD)
+        ]
 
     def _on_grasps(self, message: Grasps) -> None:
         self._tracker.grasps({grasp.gripper: grasp.object for grasp in message.grasps})

@@ -57,6 +57,8 @@ class SimNode(PacedSimulator):
 
     def _command_base(self, message: Twist) -> None:
         self.session.command_base(*base_twist(message))
+        if self.session.halted:
+            self.get_logger().warning(self.session.halted, throttle_duration_sec=1.0)
 
     def _command_torso(self, message: Float64MultiArray) -> None:
         if len(message.data) != 1:
