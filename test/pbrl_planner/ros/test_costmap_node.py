@@ -104,6 +104,7 @@ def test_a_place_that_is_kept_out_of_is_lethal_though_nothing_is_seen_there(mapp
     mapping.stage.until(lambda: mapping.node.tracker.kept_out)
     assert mapping.look().cost(x + 0.4, y + 0.6) == LETHAL
     before = len(mapping.whole)
+    mapping.stage.tick(0.6)
     mapping.stage.until(lambda: len(mapping.whole) > before)
     assert field_from_msg(mapping.whole[-1]).cost(x + 0.4, y + 0.6) == LETHAL
 
