@@ -96,6 +96,17 @@ def test_who_is_backed_up_to_steps_back_where_there_is_room(client, room):
     assert (one.place[0] < -0.5) == room
 
 
+def test_who_has_a_wall_behind_steps_aside(client):
+    one = walker(client, Person(route=((0.0, 0.0), (0.001, 0.0)), speed=1.0, pause=1e3), social=True)
+    one.place, behind, gaps = np.array([0.0, 0.0]), 0.6, []
+    for _ in range(400):
+        behind -= 0.3 * TICK
+        off = np.array([behind, 0.0]) - one.place
+        gaps.append(float(np.hypot(*off)))
+        one.move(Nearness(gaps[-1], tuple(off / gaps[-1])), lambda way: way[0] > -0.4)
+    assert min(gaps) > 0.15 and abs(one.place[1]) > 0.1
+
+
 def test_who_stands_beside_a_cart_that_does_not_pass_gives_it_room_and_walks_on(client):
     """Both ways along the corridor lead a little towards the cart, 0.15 m to the side: they waited for each other."""
     one = walker(client, Person(route=((-2.0, 0.1), (2.0, 0.1)), speed=1.0, pause=1e3), social=True)

@@ -8,6 +8,7 @@ from time import thread_time
 
 import numpy as np
 
+from pbrl_bringup.cart.along import onward, rest
 from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
 from pbrl_bringup.cart.senses import CartSenses
 from pbrl_control.cart import (
@@ -22,6 +23,7 @@ from pbrl_control.planar import Array, compose, wrap
 from pbrl_planner.cart.navigator import PATIENCE, Answer, Navigator
 from pbrl_planner.cart.outline import motions
 from pbrl_planner.cart.settings import CartParameters, load_cart
+from pbrl_planner.cart.trail import Headway, Trail
 from pbrl_planner.costmap import CostField
 from pbrl_planner.lattice import LatticePlan, LatticeSettings, Motions
 from pr2_cart_sim.scene import OfficeScene
@@ -33,8 +35,6 @@ TICK = 0.05
 SIDES = ("left", "right")
 LONGEST = 300.0
 """Simulated time after which a leg is given up [s]."""
-AHEAD, ENOUGH = 0.3, 1.5
-"""Way [m, rad] along a plan after which the next one begins; what is left of it at least for that to be worth it."""
 IN_THE_WAY = (Cause.OBSTACLE, Cause.FOOTPRINT)
 """Why a plan is given up that may be good again in a moment."""
 TRACED = 0.5
@@ -43,9 +43,12 @@ TRACED = 0.5
 
 @dataclass
 class _Going:
-    """A plan that is driven: its controller, when it began, since when it stands before something."""
+    """What is driven: a plan, its controller, when it began, since when it stands before something.
 
-    plan: LatticePlan
+    Without a plan it is the way back along where they came.
+    """
+
+    plan: LatticePlan | None
     controller: CartController
     since: float
     blocked: float | None = None
@@ -98,6 +101,8 @@ class CartRun:
         self._sent = np.zeros(4)
         self._next_tick, self._next_plan, self._next_trace = 0.0, 0.0, 0.0
         self._pause = self._navigation.retry
+        self._trail, self._headway = Trail(), Headway()
+        self._stuck: float | None = None
 
     def step(self) -> None:
         """Advance the simulator by one step; perceive, and control at each tick."""
@@ -113,6 +118,9 @@ class CartRun:
         if self._going is None and now >= self._next_plan:
             self._set_out(now)
         percept = self.senses.percept(now)
+        if self._going is not None and self._going.plan is not None and (here := self.senses.state(now)) is not None:
+            self._trail.at(here)
+            self._stuck = None if self._headway.at(here) else self._stuck
         if self._going is not None and percept is not None:
             began = thread_time()
             command = self._going.controller.step(now, percept)
@@ -138,13 +146,15 @@ class CartRun:
         """Do what the controller's status asks for."""
         going = self._going
         assert going is not None, "called while a plan is driven"
-        if command.status is DriveStatus.ARRIVED:
-            self.reached, self.ended = True, "at the goal"
-        elif command.status is DriveStatus.FAILED:
+        if command.status is DriveStatus.FAILED:
             self.ended = command.reason
+        elif going.plan is None:
+            self._heed_way_back(now, command)
+        elif command.status is DriveStatus.ARRIVED:
+            self.reached, self.ended = True, "at the goal"
         elif command.status is DriveStatus.REPLAN:
             self.senses.recover(now)
-            self._give_up(now, going, command)
+            self._give_up(now, going, going.plan, command)
         elif command.status is DriveStatus.BLOCKED:
             going.blocked = now if going.blocked is None else going.blocked
             if now - going.blocked >= self._navigation.blocked and now >= self._next_plan:
@@ -152,14 +162,28 @@ class CartRun:
         else:
             going.blocked = None
             if now - going.since >= self._navigation.refresh and now >= self._next_plan:
-                self._go_over(now, going, command.goal)
+                self._go_over(now, going, going.plan, command.goal)
 
-    def _give_up(self, now: float, going: _Going, command: CartCommand) -> None:
+    def _heed_way_back(self, now: float, command: CartCommand) -> None:
+        """At its end, or where it is not free, wait for who wants to get by."""
+        if command.status in (DriveStatus.ARRIVED, DriveStatus.REPLAN):
+            self._going, self._next_plan = None, now + self._navigation.room
+        if command.status is DriveStatus.REPLAN:
+            self.senses.recover(now)
+
+    def _make_way(self, now: float) -> None:
+        """Go back along where they came: who stands in the way may be shut in by them."""
+        self._stuck, body = None, self.senses.body
+        poses = self._trail.back(self._navigation.way_back)
+        if poses is not None and body is not None:
+            self._going = _Going(None, self._controller(poses, body), now)
+
+    def _give_up(self, now: float, going: _Going, driven: LatticePlan, command: CartCommand) -> None:
         """Have another plan made; while there is none, wait on what is left of this one for the way to get free."""
         self._going = None
         if command.cause in IN_THE_WAY and self.senses.body is not None:
-            left = self._controller(rest(going.plan, command.goal), self.senses.body)
-            self._going = _Going(going.plan, left, going.since, now if going.blocked is None else going.blocked)
+            left = self._controller(rest(driven, command.goal), self.senses.body)
+            self._going = _Going(driven, left, going.since, now if going.blocked is None else going.blocked)
 
     def _set_out(self, now: float) -> None:
         """Plan from here, and drive that; without a plan go on with the old one, if any, and try again later."""
@@ -173,6 +197,9 @@ class CartRun:
             self._pause = self._navigation.retry
             self._next_plan = now + self._pause
         if made is None:
+            self._stuck = now if self._stuck is None else self._stuck
+            if now - self._stuck > self._navigation.make_way:
+                self._make_way(now)
             return
         self._going = _Going(made, self._controller(np.vstack([here, made.poses]), body), now)
 
@@ -189,15 +216,15 @@ class CartRun:
         self.last_plan = made if found else self.last_plan
         return made
 
-    def _go_over(self, now: float, going: _Going, aim: Array) -> None:
+    def _go_over(self, now: float, going: _Going, driven: LatticePlan, aim: Array) -> None:
         """Plan again from a little further along the plan that is driven; drive that where it is another."""
         floor, body = self.senses.floor(now), self.senses.body
-        head = onward(going.plan, aim)
+        head = onward(driven, aim)
         if floor is None or body is None or head is None:
             return
         going.since = now
         made = self._asked(now, floor, head[-1])
-        if made is None or np.array_equal(made.primitives, going.plan.primitives[-len(made.primitives) :]):
+        if made is None or np.array_equal(made.primitives, driven.primitives[-len(made.primitives) :]):
             return
         self._going = _Going(made, self._controller(np.vstack([head, made.poses]), body), now)
 
@@ -291,39 +318,6 @@ def outcome(run: CartRun) -> CartOutcome:
         tuple(tuple(map(float, corner)) for corner in room),
         tuple(tuple(map(float, pose)) for pose in poses),
     )
-
-
-def onward(plan: LatticePlan, aim: Array) -> Array | None:
-    """Return the poses (m, 4) of a plan from where it is driven now to a state of the lattice that lies ahead.
-
-    Args:
-        plan: that is driven.
-        aim: (4,) of it that the controller goes for now.
-
-    Returns:
-        None where the plan ends soon.
-    """
-    here = _nearest(plan, aim)
-    left = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(plan.poses[here:], axis=0)).sum(axis=1))))
-    ahead = [
-        k
-        for k in range(here + 1, len(plan.poses))
-        if left[k - here] >= AHEAD and (plan.waypoints == plan.poses[k]).all(axis=1).any()
-    ]
-    if not ahead or left[-1] < ENOUGH:
-        return None
-    return np.vstack([aim, plan.poses[here + 1 : ahead[0] + 1]])
-
-
-def rest(plan: LatticePlan, aim: Array) -> Array:
-    """Return what is left of a plan as poses (m, 4), from a pose (4,) of it that the controller goes for."""
-    return np.vstack([aim, plan.poses[_nearest(plan, aim) + 1 :]])
-
-
-def _nearest(plan: LatticePlan, aim: Array) -> int:
-    off = plan.poses - aim
-    off[:, 2] = np.mod(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi
-    return int(np.argmin(np.sum(off**2, axis=1)))
 
 
 def _finite(value: float) -> float | None:

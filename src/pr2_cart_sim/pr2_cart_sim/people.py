@@ -31,6 +31,8 @@ TOUCH = 0.01
 PAST, ROOM = 0.4, 0.5
 """Cosine of the angle between somebody's way and the nearest of robot and cart below which it leads past; and the share
 of their margin that has to be left for that. Where less is left, they step back."""
+ASIDE = (0.0, 0.8, -0.8, 1.5, -1.5)
+"""Off the way straight back, in which they step where there is no room [rad]."""
 TURNING = 4.0
 """Rate [rad/s] at which people turn."""
 ARRIVED = 0.05
@@ -99,9 +101,9 @@ class Walker:
             near: how near robot or cart is, None where it is not.
             free: whether there is room for a step in a direction (2,).
         """
-        away = self._away(near)
-        if away is not None and free(away):
-            self._step(away, self._person.speed * TICK)
+        aside = next((way for way in self._away(near) if free(way)), None)
+        if aside is not None:
+            self._step(aside, self._person.speed * TICK)
             return
         if self._rest > 0:
             self._rest -= TICK
@@ -127,16 +129,18 @@ class Walker:
         self._stands, self.speed = False, self._person.speed
         self._put(1.0)
 
-    def _away(self, near: Nearness | None) -> Array | None:
-        """Return the direction (2,) in which who has manners steps back, as robot or cart come close; None: no need.
+    def _away(self, near: Nearness | None) -> list[Array]:
+        """Return directions (2,) in which who has manners steps back as robot or cart come close, the best first.
 
         They see a robot that backs up, which has no laser behind; and who stands beside a cart that does not pass them
         gives it room instead of waiting for it for ever.
         """
         if near is None or not self._manners.social or near.distance >= ROOM * self._manners.margin:
-            return None
-        size = math.hypot(*near.direction)
-        return -np.array(near.direction) / size if size > 0.0 else None
+            return []
+        x, y = near.direction
+        size = math.hypot(x, y)
+        turns = [(math.cos(angle), math.sin(angle)) for angle in ASIDE] if size > 0.0 else []
+        return [-np.array([c * x - s * y, s * x + c * y]) / size for c, s in turns]
 
     def step_in(self, goal: Array) -> None:
         """Go and stand at `goal` (2,) [m] for a while, then come back."""

@@ -8,8 +8,9 @@ import math
 import numpy as np
 import pytest
 
+from pbrl_bringup.cart.along import AHEAD, onward, rest
 from pbrl_bringup.cart.outcome import CartOutcome, Score, Touch, Trace
-from pbrl_bringup.cart_run import AHEAD, CartRun, onward, rest
+from pbrl_bringup.cart_run import CartRun
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments import cart_desks
 from pbrl_bringup.experiments.cart_office import TILT, leg_of, route, rows_of, scene_of

@@ -11,7 +11,8 @@ from pbrl_planner.cart.leg import ENDED, Drove, Leg, LegState, Order
 from pbrl_planner.cart.query import Outcome
 from pbrl_planner.cart.settings import NavigationSettings
 
-SETTINGS = NavigationSettings(blocked=2.0, retry=2.0, retry_most=6.0, give_up=30.0)
+SETTINGS = NavigationSettings(blocked=2.0, retry=2.0, retry_most=6.0, give_up=30.0, make_way=1e3)
+MAKES_WAY = SETTINGS.model_copy(update={"make_way": 10.0, "room": 8.0})
 
 
 def driving() -> Leg:
@@ -25,7 +26,7 @@ def test_straight_to_the_goal() -> None:
     leg = driving()
     assert leg.state is LegState.DRIVING and leg.tick(9.0) is Order.NOTHING
     assert leg.driving(1.0, 0.0, "") is Order.NOTHING and leg.sentence == "on the way"
-    assert leg.drove(Drove.ARRIVED, "") is Order.END and leg.state is LegState.ARRIVED
+    assert leg.drove(2.0, Drove.ARRIVED, "") is Order.END and leg.state is LegState.ARRIVED
     assert (leg.plans, leg.failures) == (1, 0)
 
 
@@ -83,21 +84,21 @@ def test_a_way_round_what_has_gone_meanwhile_is_not_taken() -> None:
 
 def test_a_drive_that_is_given_up_is_planned_again() -> None:
     leg = driving()
-    assert leg.drove(Drove.REPLAN, "too far off") is Order.CLEAR and leg.sentence == "too far off"
+    assert leg.drove(2.0, Drove.REPLAN, "too far off") is Order.CLEAR and leg.sentence == "too far off"
     assert leg.tick(2.2) is Order.PLAN and leg.state is LegState.PLANNING
 
 
 @pytest.mark.parametrize("ended", [Drove.GRIP_LOST, Drove.REFUSED, Drove.STOPPED])
 def test_other_ends_of_a_drive_end_the_goal(ended: Drove) -> None:
     leg = driving()
-    assert leg.drove(ended, "") is Order.END and leg.state is LegState.FAILED and leg.sentence == str(ended)
+    assert leg.drove(2.0, ended, "") is Order.END and leg.state is LegState.FAILED and leg.sentence == str(ended)
 
 
 def test_whatever_comes_after_the_end_changes_nothing() -> None:
     leg = driving()
-    leg.drove(Drove.ARRIVED, "")
+    leg.drove(2.0, Drove.ARRIVED, "")
     before = (leg.state, leg.sentence, leg.plans)
-    assert leg.planned(9.0, Outcome.FOUND, "x") is leg.drove(Drove.REPLAN, "y") is leg.tick(99.0) is Order.NOTHING
+    assert leg.planned(9.0, Outcome.FOUND, "x") is leg.drove(9.0, Drove.REPLAN, "y") is leg.tick(99.0) is Order.NOTHING
     assert leg.driving(9.0, 9.0, "z") is Order.NOTHING and (leg.state, leg.sentence, leg.plans) == before
 
 
@@ -111,7 +112,7 @@ def test_no_order_of_events_leaves_it_with_nothing_to_do_for_ever() -> None:
             if asked and rng.random() < 0.5:
                 asked, order = False, leg.planned(now, rng.choice(list(Outcome)), "")
             elif driven and rng.random() < 0.3:
-                driven, order = False, leg.drove(rng.choice(list(Drove)), "")
+                driven, order = False, leg.drove(now, rng.choice(list(Drove)), "")
             elif driven:
                 order = leg.driving(now, float(rng.uniform(0.0, 4.0)), "")
             else:
@@ -138,7 +139,7 @@ def test_on_the_way_a_better_path_is_looked_for_from_time_to_time() -> None:
 def test_a_better_path_for_a_drive_that_has_ended_is_no_path_from_here() -> None:
     leg = driving()
     assert leg.driving(16.0, 0.0, "") is Order.REFINE
-    assert leg.drove(Drove.REPLAN, "off the path") is Order.CLEAR and leg.tick(18.0) is Order.NOTHING
+    assert leg.drove(17.0, Drove.REPLAN, "off the path") is Order.CLEAR and leg.tick(18.0) is Order.NOTHING
     assert leg.planned(18.5, Outcome.FOUND, "") is Order.NOTHING and leg.tick(18.6) is Order.PLAN
 
 
@@ -148,3 +149,58 @@ def test_where_too_little_is_left_nothing_is_asked() -> None:
     leg.nothing_ahead(16.0)
     assert not leg.asked and leg.driving(20.0, 0.0, "") is Order.NOTHING
     assert leg.driving(21.0, 2.5, "somebody") is Order.PLAN
+
+
+def stuck(leg: Leg, now: float, driving: bool) -> float:
+    """Answer every question with no path until robot and cart are to go back; return when that is [s]."""
+    while True:
+        asked = leg.driving(now, 5.0, "somebody") if driving else leg.tick(now)
+        if asked is Order.PLAN and leg.planned(now, Outcome.NO_PATH, "shut") is Order.BACK:
+            return now
+        now += 0.5
+        assert now < 60.0
+
+
+@pytest.mark.parametrize("before_something", [False, True])
+@pytest.mark.parametrize("ended", [Drove.ARRIVED, Drove.REPLAN])
+def test_who_has_no_path_for_long_goes_back_waits_and_tries_again(before_something: bool, ended: Drove) -> None:
+    leg = Leg(MAKES_WAY, 0.0)
+    leg.tick(0.0)
+    if before_something:
+        leg.planned(0.0, Outcome.FOUND, "4 s")
+    else:
+        leg.planned(0.0, Outcome.NO_PATH, "shut")
+    back = stuck(leg, 0.5, before_something)
+    assert MAKES_WAY.make_way < back < MAKES_WAY.make_way + 2.0 * MAKES_WAY.retry_most
+    assert leg.state is LegState.DRIVING and "to make way" in leg.sentence
+    orders = {leg.driving(back + t, 9.0, "x") for t in (1.0, 9.0, 20.0)} | {leg.tick(back + 20.0)}
+    assert orders == {Order.NOTHING}, "nothing is asked on the way back"
+    there = back + 21.0
+    assert leg.drove(there, ended, "") is (Order.CLEAR if ended is Drove.REPLAN else Order.NOTHING)
+    assert leg.state is LegState.WAITING and leg.tick(there + MAKES_WAY.room - 0.1) is Order.NOTHING
+    assert leg.tick(there + MAKES_WAY.room) is Order.PLAN
+    assert leg.planned(there + 8.1, Outcome.FOUND, "4 s") is Order.FOLLOW
+    assert leg.drove(there + 12.0, Drove.ARRIVED, "") is Order.END and leg.state is LegState.ARRIVED
+
+
+@pytest.mark.parametrize("gets_on", [True, False])
+def test_who_gets_on_in_between_is_not_stuck_and_who_finds_paths_in_between_is(gets_on: bool) -> None:
+    leg, orders = Leg(MAKES_WAY, 0.0), []
+    leg.tick(0.0)
+    leg.planned(0.0, Outcome.FOUND, "99 s")
+    for now in np.arange(1.0, 40.0, 0.5):
+        waits = now % 8.0 < 5.0  # somebody walks by, and somebody else
+        if leg.driving(now, now % 8.0 if waits else 0.0, "somebody") is Order.PLAN:
+            orders.append(leg.planned(now, Outcome.NO_PATH if now % 3.0 < 2.0 else Outcome.FOUND, "shut"))
+        if gets_on and not waits:
+            leg.got_on()
+    assert (Order.BACK in orders) == (not gets_on) and Order.FOLLOW in orders and Order.FORGET in orders
+
+
+def test_who_came_from_nowhere_goes_on_asking() -> None:
+    leg = Leg(MAKES_WAY, 0.0)
+    leg.tick(0.0)
+    leg.planned(0.0, Outcome.NO_PATH, "shut")
+    back = stuck(leg, 0.5, False)
+    leg.nothing_behind()
+    assert leg.state is LegState.WAITING and leg.tick(back + SETTINGS.retry_most) is Order.PLAN

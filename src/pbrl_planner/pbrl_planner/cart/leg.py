@@ -38,6 +38,7 @@ class Order(StrEnum):
     REFINE = "ask the planner for a better path from a place ahead"
     FOLLOW = "drive along the path"
     SWITCH = "drive on to that place, and along the better path from there"
+    BACK = "go back along where robot and cart came"
     END = "say how it ended"
 
 
@@ -66,10 +67,11 @@ class Leg:
         self.began = now
         self.state, self.sentence = LegState.PLANNING, "looking for a path"
         self.plans = self.failures = 0
-        self._asked = self._driving = self._stands = self._refining = False
+        self._asked = self._driving = self._stands = self._refining = self._backing = False
         self._since = now  # on this path
         self._next, self._pause = now, settings.retry
         self._without: float | None = None
+        self._stuck: float | None = None
 
     def tick(self, now: float) -> Order:
         """Return what is due now."""
@@ -95,6 +97,10 @@ class Leg:
         self._next, self._pause = now + self._pause, min(2.0 * self._pause, self._settings.retry_most)
         if outcome in HOPELESS:
             return self._say(LegState.FAILED, message, Order.END)
+        self._stuck = now if self._stuck is None else self._stuck
+        if now - self._stuck > self._settings.make_way:
+            self._stuck, self._driving, self._stands, self._backing = None, True, False, True
+            return self._say(LegState.DRIVING, f"going back to make way; {message}", Order.BACK)
         if self._driving:
             self.sentence = f"stands before something; {message}"
             return Order.FORGET
@@ -108,7 +114,7 @@ class Leg:
 
     def driving(self, now: float, blocked: float, reason: str) -> Order:
         """Take in how the drive goes on: for how long it has stood before something [s], and why it is slow."""
-        if self.state is not LegState.DRIVING:
+        if self.state is not LegState.DRIVING or self._backing:
             return Order.NOTHING
         self._stands = blocked > 0.0
         self.sentence = reason if reason and self._stands else "on the way"
@@ -133,11 +139,24 @@ class Leg:
         self._asked = self._refining = False
         self._since = now
 
-    def drove(self, ended: Drove, message: str) -> Order:
+    def got_on(self) -> None:
+        """Take in that there is headway: paths that are found and shut again at once are none."""
+        self._stuck = None
+
+    def nothing_behind(self) -> None:
+        """Take in that there is no way back: robot and cart have not come from anywhere."""
+        self._backing = self._driving = False
+        self.state = LegState.WAITING
+
+    def drove(self, now: float, ended: Drove, message: str) -> Order:
         """Take in how the drive ended; not for one whose place another path has taken."""
-        self._driving = False
+        backing, self._backing, self._driving = self._backing, False, False
         if self.state in ENDED:
             return Order.NOTHING
+        if backing and ended in (Drove.ARRIVED, Drove.REPLAN):
+            self._next = now + self._settings.room
+            order = Order.CLEAR if ended is Drove.REPLAN else Order.NOTHING
+            return self._say(LegState.WAITING, "waiting for who wants to get by", order)
         if ended is Drove.ARRIVED:
             return self._say(LegState.ARRIVED, "at the goal", Order.END)
         if ended is Drove.REPLAN:

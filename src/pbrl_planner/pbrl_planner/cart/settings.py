@@ -21,6 +21,10 @@ class NavigationSettings(Section):
         unseen: [s] after which something that nobody has seen since is taken to be gone, where it leaves no path.
         refresh: [s] on one path after which a better one is looked for, from a place ahead on it: the floor is better
             known by then.
+        make_way: [s] without a path after which robot and cart go back along where they came: who stands in the way may
+            be shut in by them.
+        way_back: how far they go back [m].
+        room: [s] that they wait there.
         give_up: [s] without a path after which the goal is given up: people leave, walls do not.
     """
 
@@ -29,6 +33,9 @@ class NavigationSettings(Section):
     retry_most: Positive = 6.0
     unseen: Positive = 5.0
     refresh: Positive = 15.0
+    make_way: Positive = 20.0
+    way_back: Positive = 2.5
+    room: Positive = 8.0
     give_up: Positive = 120.0
 
 

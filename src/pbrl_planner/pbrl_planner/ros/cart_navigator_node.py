@@ -1,8 +1,9 @@
 """Brings robot and cart to a goal: from RViz on /goal_pose, or by the action /navigate_cart; the last one counts.
 
 It asks /plan_cart_path, hands the path to /follow_cart_path, and asks again where something stays in the way, a path
-was given up, or there was none: people leave. While it drives it looks for a better path, from a place ahead on the one
-that is driven. /cart_navigator/status (std_msgs/String) says where it is.
+was given up, or there was none: people leave. Where there is none for long it goes back along where it came, to make
+way for whom it may shut in. While it drives it looks for a better path, from a place ahead on the one that is driven.
+/cart_navigator/status (std_msgs/String) says where it is.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from pbrl_control.ros.qos import COMMANDS
 from pbrl_planner.cart.ahead import join_ahead, joined
 from pbrl_planner.cart.leg import ENDED, Drove, Leg, LegState, Order
 from pbrl_planner.cart.query import Outcome
+from pbrl_planner.cart.trail import Headway, Trail
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.ros.conversions import MAP, path_from_msg, path_to_msg, pose_in_map, pose_to_msg
 from pbrl_planner.ros.one_goal import OneGoal
@@ -74,6 +76,7 @@ class CartNavigatorNode(Node):
         self._leg: Leg | None = None
         self._number = 0
         self._drive: _Drive | None = None
+        self._trail, self._headway = Trail(), Headway()
         self._mending = False
         self._epsilon = self._remaining = 0.0
         self._planner = ActionClient(self, PlanCartPath, "plan_cart_path")
@@ -173,7 +176,7 @@ class CartNavigatorNode(Node):
             self._do(leg.planned(self._now(), Outcome.NOT_READY, NO_PLANNER))
         if self._drive is not None and not self._driver.server_is_ready():
             self._drive = None
-            self._do(leg.drove(Drove.REFUSED, NO_CONTROLLER))
+            self._do(leg.drove(self._now(), Drove.REFUSED, NO_CONTROLLER))
         if self._mending and not any(each.service_is_ready() for each in self._mend.values()):
             self._mending = False
 
@@ -186,6 +189,8 @@ class CartNavigatorNode(Node):
             self._ask_ahead()
         elif order is Order.SWITCH:
             self._switch(path)
+        elif order is Order.BACK:
+            self._go_back()
         elif order in self._mend:
             self._mend_costmaps(order)
         elif order is Order.END:
@@ -248,18 +253,28 @@ class CartNavigatorNode(Node):
     def _follow(self, path: Any) -> None:
         assert self._leg is not None
         if not self._driver.server_is_ready():
-            self._do(self._leg.drove(Drove.REFUSED, NO_CONTROLLER))
+            self._do(self._leg.drove(self._now(), Drove.REFUSED, NO_CONTROLLER))
             return
         # Of another path that is driven nothing more is wanted: the controller lets this one take its place.
         try:
             drive = self._drive = _Drive(path_from_msg(path))
         except PlannerError as error:
-            self._do(self._leg.drove(Drove.REFUSED, f"the planner's path: {error}"))
+            self._do(self._leg.drove(self._now(), Drove.REFUSED, f"the planner's path: {error}"))
             return
         sent = self._driver.send_goal_async(
             FollowCartPath.Goal(path=path), feedback_callback=partial(self._on_driving, drive)
         )
         sent.add_done_callback(partial(self._on_followed, drive))
+
+    def _go_back(self) -> None:
+        """Drive back along what was driven; what is blocked on the old path is not wanted any more."""
+        assert self._leg is not None
+        poses = self._trail.back(self._settings.way_back)
+        if poses is None:
+            self._stop()
+            self._leg.nothing_behind()
+        else:
+            self._follow(path_to_msg(poses, self._now()))
 
     def _on_followed(self, drive: _Drive, future: Future) -> None:
         drive.handle = future.result()
@@ -273,6 +288,10 @@ class CartNavigatorNode(Node):
         if drive is not self._drive or self._leg is None:
             return
         feedback = message.feedback
+        for pose in drive.poses[drive.passed : int(feedback.passed)]:
+            self._trail.at(pose)
+            if self._headway.at(pose):
+                self._leg.got_on()
         self._remaining, drive.passed = float(feedback.remaining), int(feedback.passed)
         self._do(self._leg.driving(self._now(), float(feedback.blocked), feedback.reason))
 
@@ -281,7 +300,7 @@ class CartNavigatorNode(Node):
             return
         self._drive = None
         result = future.result().result
-        self._do(self._leg.drove(ENDS[result.outcome], result.message))
+        self._do(self._leg.drove(self._now(), ENDS[result.outcome], result.message))
 
     def _mend_costmaps(self, order: Order) -> None:
         """Have the costmaps' node do what is ordered; nothing is planned before it has, if it is there."""
