@@ -161,15 +161,15 @@ def test_who_stands_before_something_looks_for_a_way_round(play: Play) -> None:
     play.says("arrived")
 
 
-def under_way(play: Play, condition: Callable[[], Any], passed: int) -> None:
-    """Drive on until a condition holds, and tell how many poses lie behind."""
+def under_way(play: Play, condition: Callable[[], Any], passed: int, blocked: float = 0.0) -> None:
+    """Drive on until a condition holds, and tell how many poses lie behind, and for how long it has stood [s]."""
 
     told = [0.0]
 
     def drive() -> Any:
         if play.stage.time > told[0] + 0.2:  # more than that would only be in the way of the clock
             told[0] = play.stage.time
-            play.driving(status="on the way", passed=passed)
+            play.driving(status="on the way", passed=passed, blocked=blocked, reason="something is in the way")
         return condition()
 
     play.until(drive)
@@ -212,6 +212,29 @@ def test_a_better_path_that_comes_too_late_or_is_the_same_changes_nothing(play: 
     play.ended(Follow.ARRIVED)
     play.says("arrived")
     assert len(play.given) == 1 and len(play.asked) == 3, "near the end nothing is asked"
+
+
+def test_without_a_path_for_long_it_goes_back_along_where_it_came_waits_and_asks_again(play: Play) -> None:
+    play.stage.send("/goal_pose", goal(10.0))
+    play.answer(Plan.FOUND, poses=LONG)
+    play.until(lambda: play.given)
+    under_way(play, after(play, 1.0), 101)
+    question = 1
+    while not any("going back to make way" in each.data for each in play.status):
+        question += 1
+        said = len(play.status)
+        under_way(play, lambda question=question: len(play.asked) >= question, 101, 5.0)
+        play.answer(Plan.GOAL_OCCUPIED, f"somebody stands at the goal, {question}", count=question)
+        play.until(lambda said=said: any("at the goal" in each.data for each in play.status[said:]))
+    play.until(lambda: len(play.given) == 2)
+    back = np.array([each.pose.position.x for each in play.given[1].path.path.poses])
+    assert back[0] == pytest.approx(LONG[100, 0]) and back[0] - back[-1] == pytest.approx(2.5, abs=0.06)
+    assert (np.diff(back) < 0.0).all()
+    play.ended(Follow.ARRIVED)
+    play.says("waiting for who wants to get by")
+    play.later(8.1)
+    play.answer(Plan.FOUND, count=question + 1)
+    play.until(lambda: len(play.given) == 3)
 
 
 def test_a_path_that_is_given_up_is_planned_again_on_cleared_costmaps(play: Play) -> None:
