@@ -33,7 +33,7 @@ class NavigationSettings(Section):
     retry_most: Positive = 6.0
     unseen: Positive = 5.0
     refresh: Positive = 15.0
-    make_way: Positive = 20.0
+    make_way: Positive = 45.0
     way_back: Positive = 2.5
     room: Positive = 8.0
     give_up: Positive = 120.0
