@@ -167,7 +167,10 @@ class CartRun:
     def _heed_way_back(self, now: float, command: CartCommand) -> None:
         """At its end, or where it is not free, wait for who wants to get by."""
         if command.status in (DriveStatus.ARRIVED, DriveStatus.REPLAN):
-            self._going, self._next_plan = None, now + self._navigation.room
+            told = self._navigation
+            self._going, self._next_plan = None, now + told.room
+            # Where that was not far enough, it goes on soon.
+            self._stuck = now - told.make_way + 2.0 * told.room
         if command.status is DriveStatus.REPLAN:
             self.senses.recover(now)
 

@@ -179,6 +179,12 @@ def test_who_has_no_path_for_long_goes_back_waits_and_tries_again(before_somethi
     assert leg.drove(there, ended, "") is (Order.CLEAR if ended is Drove.REPLAN else Order.NOTHING)
     assert leg.state is LegState.WAITING and leg.tick(there + MAKES_WAY.room - 0.1) is Order.NOTHING
     assert leg.tick(there + MAKES_WAY.room) is Order.PLAN
+    assert leg.planned(there + 8.1, Outcome.NO_PATH, "shut") in (Order.FORGET, Order.CLEAR)
+    again = stuck(leg, there + 8.2, False)
+    assert again <= there + 2.0 * MAKES_WAY.room + MAKES_WAY.retry_most, "sooner than the first time"
+    leg.drove(again + 9.0, ended, "")
+    there = again + 9.0
+    assert leg.tick(there + MAKES_WAY.room) is Order.PLAN
     assert leg.planned(there + 8.1, Outcome.FOUND, "4 s") is Order.FOLLOW
     assert leg.drove(there + 12.0, Drove.ARRIVED, "") is Order.END and leg.state is LegState.ARRIVED
 

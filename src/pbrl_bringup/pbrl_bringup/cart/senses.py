@@ -20,7 +20,7 @@ from pr2_cart_sim.observations import BaseOdometry, CartReading, KnownMap, Local
 
 LASER, NODDING = "base_laser_link", "laser_tilt_link"
 LOCAL = CostmapSettings()
-WHOLE = CostmapSettings(mark_range=6.0, clear_range=8.0, evidence=EvidenceSettings(memory=60.0))
+WHOLE = CostmapSettings(mark_range=6.0, clear_range=8.0, unseen=126, evidence=EvidenceSettings(memory=60.0))
 """Of the floor that is planned on: what was seen of it is remembered for about as long as a room is left."""
 SIGHT_AGE, MISFIT = 0.25, 0.03
 """As old [s] and as far off [m] a reading of the cart may be before the next source is asked."""

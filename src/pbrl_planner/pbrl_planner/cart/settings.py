@@ -24,7 +24,7 @@ class NavigationSettings(Section):
         make_way: [s] without a path after which robot and cart go back along where they came: who stands in the way may
             be shut in by them.
         way_back: how far they go back [m].
-        room: [s] that they wait there.
+        room: [s] that they wait there; without a path after twice that they go back further.
         give_up: [s] without a path after which the goal is given up: people leave, walls do not.
     """
 

@@ -230,7 +230,8 @@ class Costmap:
         kernel.forget(
             now, evidence.confirmed, evidence.fleeting, evidence.memory, self._evidence, self._looked, self._last
         )
-        lethal, unknown = self._evidence > 0, self._looked == 0
+        lethal, unseen = self._evidence > 0, self._looked == 0
+        unknown = unseen.copy()
         if self._overhang is not None:
             lethal |= self._overhang.occupied(now)
         known = self._from_map()
@@ -243,6 +244,8 @@ class Costmap:
         if self.settings.unknown != "unknown":
             unknown[:] = False
         cells = inflate(lethal, unknown, self.settings.resolution, self.settings.inflation)
+        if known is not None and self.settings.unseen:
+            np.maximum(cells, self.settings.unseen, out=cells, where=unseen & (known == 0))
         return CostField(cells, self.settings.resolution, self.origin, self.time)
 
     def clear_inside(self, outlines: Sequence[Array]) -> Recovery:

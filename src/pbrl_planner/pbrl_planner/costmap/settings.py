@@ -128,6 +128,8 @@ class CostmapSettings(Section):
         clear_range: [m] up to which floor is cleared.
         own_margin: [m] about the outlines of robot and cart in which readings are taken for their own.
         unknown: what becomes of cells that nobody saw: cost 255, 0 or 254.
+        unseen: cost at least of cells that are free by the map alone, up to 252: things stand there that no map has, so
+            that it is better to go where somebody has looked.
         stale: [s] after the last scan at which the costmap is not to be relied upon.
         inflation: how cost falls off from obstacles.
         evidence: what is believed of a cell.
@@ -141,6 +143,7 @@ class CostmapSettings(Section):
     clear_range: Annotated[Positive, Field(le=100.0)] = 5.0
     own_margin: Annotated[NotNegative, Field(le=0.5)] = 0.03
     unknown: Literal["unknown", "free", "lethal"] = "unknown"
+    unseen: Annotated[int, Field(ge=0, le=252)] = 0
     stale: Positive = 0.15
     inflation: InflationSettings = InflationSettings()
     evidence: EvidenceSettings = EvidenceSettings()
