@@ -99,8 +99,7 @@ class Leg:
             return self._say(LegState.FAILED, message, Order.END)
         self._stuck = now if self._stuck is None else self._stuck
         if now - self._stuck > self._settings.make_way:
-            self._stuck = self._without = None
-            self._driving, self._stands, self._backing = True, False, True
+            self._stuck, self._driving, self._stands, self._backing = None, True, False, True
             return self._say(LegState.DRIVING, f"going back to make way; {message}", Order.BACK)
         if self._driving:
             self.sentence = f"stands before something; {message}"
@@ -155,7 +154,7 @@ class Leg:
         if self.state in ENDED:
             return Order.NOTHING
         if backing and ended in (Drove.ARRIVED, Drove.REPLAN):
-            self._next = now + self._settings.room
+            self._next, self._without = now + self._settings.room, None
             # Where that was not far enough, it goes on soon.
             self._stuck = now - self._settings.make_way + 2.0 * self._settings.room
             order = Order.CLEAR if ended is Drove.REPLAN else Order.NOTHING
