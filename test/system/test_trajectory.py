@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -98,10 +99,12 @@ def test_a_table_is_turned_to_where_its_trajectory_ends(watched: tuple[int, Watc
         spin_until(lambda: watcher.seen(BEFORE), executor, running)
         with running_graph(push, tmp_path / "push", domain) as pushing:
             spin_until(watcher.ended, executor, running, pushing)
-    order = list(dict.fromkeys(watcher.phases))
+    # Whoever is found late does not hear all phases: some last a quarter of a second at this rate.
+    logged = re.findall(r"\[push\]: (\w+): ", (tmp_path / "push" / "push.log").read_text(encoding="utf-8"))
+    order = list(dict.fromkeys(logged))
     assert order == [phase for phase in Phase if phase in order], "phases come in their order"
     assert {"grasp", "push", "release"} <= set(order)
-    assert order[-1] == "done"
+    assert order[-1] == watcher.phases[-1] == "done"
     start, end = (np.mean(watcher.poses[phase][-SEEN:], axis=0) for phase in (BEFORE, "done"))
     goal = load_trajectory(PLAN).trajectory(start).end
     assert math.dist(goal[:2], end[:2]) < PLACE

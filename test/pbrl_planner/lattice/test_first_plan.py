@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import resource
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -200,29 +202,10 @@ def test_warming_up_changes_no_plan_and_leaves_memory_for_the_next(cells: int) -
 
 
 def test_after_warming_up_all_memory_of_a_search_is_there() -> None:
-    grid = CostGrid(np.zeros((300, 300), dtype=np.uint8), CELL)
-    motions = cart_motions()
-
-    def missing() -> int:
-        """Pages that the system brings when a search's arrays are read."""
-        lattice = Lattice(grid, motions)
-        records = motions.shelf.take_records(lattice.cells * lattice.primitives.bins)
-        arrays = [records.array]
-        for direction in DIRECTIONS:
-            sweeps = lattice.sweeps(direction)
-            arrays += [each.ravel() for each in (sweeps.free, sweeps.known, sweeps.stays_free, sweeps.stays_known)]
-        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-        for array in arrays:
-            array.max()
-        return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
-
-    kept, motions.shelf = motions.shelf, Shelf()
-    cold = missing()
-    motions.shelf = Shelf()
-    warm_up(motions, grid, LatticeSettings(time_limit=600.0, thinned=4))
-    warm = missing()
-    motions.shelf = kept
-    assert warm <= 2 < 10 < cold, f"{warm} of {cold} pages"
+    command = [sys.executable, str(Path(__file__).with_name("warm_pages.py"))]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=200, check=True)
+    warm, cold = map(int, done.stdout.split())
+    assert warm <= 2 < 10 < cold
 
 
 @pytest.mark.parametrize("door", [4, 5])
