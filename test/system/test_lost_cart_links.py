@@ -25,7 +25,7 @@ from pbrl_control.ros.qos import COMMANDS, LATCHED
 from pbrl_planner.ros.conversions import pose_to_msg
 from pr2_cart_sim.maps import FREE, OCCUPIED, GridMap, save_map
 
-FIRST, EVERY, LASTS = 14.0, 5.0, 1.5
+FIRST, EVERY, LASTS = 30.0, 5.0, 1.5
 """[s] of simulated time: of the first fault, from one to the next, and for which each lasts."""
 FAULTS = {
     "/scan": {"lost": 1.0},
@@ -35,9 +35,9 @@ FAULTS = {
     "/cmd_ve*": {"nan": 1.0},
 }
 RESTS, AT_REST, DRIVES = 0.3, 0.02, 0.05  # [s], [m/s], [m/s]
-LENGTH, GOAL = 18.0, (15.5, 1.5, 0.0)  # [m], [m, rad]
+LENGTH, GOAL = 26.0, (23.5, 1.5, 0.0)  # [m], [m, rad]
 RATE = "0.9"
-STARTED = 120.0  # [s] of the wall clock
+STARTED = 200.0  # [s] of the wall clock
 
 
 def begin_of(fault: str) -> float:

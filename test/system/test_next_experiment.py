@@ -13,6 +13,7 @@ import pytest
 import rclpy
 import yaml
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, Vector3
 from pbrl_msgs.msg import Mismatches, ObjectModels
 from pbrl_msgs.srv import PushObject
@@ -47,7 +48,18 @@ class User:
         self._executor.add_node(self.node)
         self.heard: list[Mismatches] = []
         self.node.create_subscription(Mismatches, "/mismatches", self.heard.append, LATCHED)
+        self.ages: dict[str, str] = {}
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._hear_diagnostics, 10)
         self.models = self.node.create_publisher(ObjectModels, "/object_models", LATCHED)
+
+    def _hear_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == "mismatch":
+                self.ages = {each.key: each.value for each in status.values}
+
+    def has_heard(self, topic: str) -> bool:
+        """Tell whether the watch has heard of a topic."""
+        return self.ages.get(f"{topic} age [s]", "never heard") != "never heard"
 
     def until(self, condition: Callable[[], Any]) -> None:
         deadline = time.monotonic() + PATIENCE
@@ -126,6 +138,8 @@ def test_the_next_experiment_is_run_and_the_odds_change(user: User) -> None:
     assert not nothing_yet.success and "nothing is to be told apart" in nothing_yet.message
     streams = ("/wrist_ft/left", "/ar_tags/table/pose", "/ar_tags/left_gripper/pose", "/grasps", "/scene")
     user.until(lambda: all(user.node.count_subscribers(topic) for topic in streams))
+    # A push as fast as possible is over in a moment: who is found late does not hear it.
+    user.until(lambda: user.has_heard("/scene") and user.has_heard("/grasps"))
 
     nowhere = PushObject.Request(object="chair", direction=Vector3(x=1.0), speed=0.1, duration=2.0)
     refused = user.refused(PushObject, "/push", nowhere)
