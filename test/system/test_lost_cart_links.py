@@ -16,6 +16,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
+from way import fastest
 
 from pbrl_bringup.graph import free_domain, load_graph, node_command, node_environment, wait_ready, with_parameters
 from pbrl_bringup.processes import Programs
@@ -97,14 +98,6 @@ class Passenger(Node):
             self._spinner.spin_once(timeout_sec=0.1)
             self._programs.check()
 
-    def fastest(self, begin: float, end: float) -> float:
-        """Return the greatest speed between two times [m/s], over a tenth of a second each."""
-        times = np.array([time for time, _ in self.way])
-        places = np.array([pose[:2] for _, pose in self.way])
-        grid = np.arange(begin, end + 1e-9, 0.1)
-        at = np.column_stack([np.interp(grid, times, places[:, k]) for k in (0, 1)])
-        return float(np.hypot(*np.diff(at, axis=0).T).max() / 0.1)
-
     def leave(self) -> None:
         """Leave the graph."""
         self._spinner.shutdown()
@@ -140,6 +133,6 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Passenger]:
 @pytest.mark.parametrize("fault", FAULTS)
 def test_robot_and_cart_rest_while_a_link_is_lost_and_go_on_when_it_is_back(drive: Passenger, fault: str) -> None:
     begin = begin_of(fault)
-    assert drive.fastest(begin - 0.6, begin) > DRIVES, "it drives until then"
-    assert drive.fastest(begin + RESTS, begin + LASTS - 0.1) < AT_REST
-    assert drive.fastest(begin + LASTS + 0.8, begin + EVERY - 0.1) > DRIVES, drive.said
+    assert fastest(drive.way, begin - 0.6, begin) > DRIVES, "it drives until then"
+    assert fastest(drive.way, begin + RESTS, begin + LASTS - 0.1) < AT_REST
+    assert fastest(drive.way, begin + LASTS + 0.8, begin + EVERY - 0.1) > DRIVES, drive.said

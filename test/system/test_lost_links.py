@@ -12,6 +12,7 @@ from nav_msgs.msg import Odometry
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from way import fastest
 
 from pbrl_bringup.graph import free_domain, load_graph, running_graph, with_parameters
 from pbrl_bringup.processes import Programs
@@ -66,14 +67,6 @@ class Driver(Node):
             self._spinner.spin_once(timeout_sec=0.1)
             self._programs.check()
 
-    def fastest(self, begin: float, end: float) -> float:
-        """Return the greatest speed between two times [m/s], over a tenth of a second each."""
-        times = np.array([time for time, _ in self.way])
-        places = np.array([pose[:2] for _, pose in self.way])
-        grid = np.arange(begin, end + 1e-9, 0.1)
-        at = np.column_stack([np.interp(grid, times, places[:, k]) for k in (0, 1)])
-        return float(np.hypot(*np.diff(at, axis=0).T).max() / 0.1)
-
     def leave(self) -> None:
         """Leave the graph."""
         self._spinner.shutdown()
@@ -106,6 +99,6 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driver]:
 @pytest.mark.parametrize("fault", FAULTS)
 def test_the_robot_rests_while_a_link_is_lost_and_goes_on_when_it_is_back(drive: Driver, fault: str) -> None:
     begin = begin_of(fault)
-    assert drive.fastest(begin - 0.6, begin) > DRIVES, "it drives until then"
-    assert drive.fastest(begin + RESTS, begin + LASTS - 0.1) < AT_REST
-    assert drive.fastest(begin + LASTS + 0.8, begin + EVERY - 0.1) > DRIVES
+    assert fastest(drive.way, begin - 0.6, begin) > DRIVES, "it drives until then"
+    assert fastest(drive.way, begin + RESTS, begin + LASTS - 0.1) < AT_REST
+    assert fastest(drive.way, begin + LASTS + 0.8, begin + EVERY - 0.1) > DRIVES

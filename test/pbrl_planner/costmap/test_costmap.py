@@ -30,19 +30,6 @@ def lethal_of(costmap: Costmap, now: float = 0.0) -> np.ndarray:
     return costmap.field(now).cells == 254
 
 
-def test_what_only_the_map_says_is_free_costs_more_until_somebody_has_looked() -> None:
-    cells = np.zeros((80, 80), dtype=np.int8)
-    cells[:, 70:] = 100
-    plain, wary = (Costmap.over(StaticMap(cells, 0.05), settings_of(unseen=unseen)) for unseen in (0, 126))
-    for costmap in (plain, wary):
-        costmap.observe(scan_of([2.0] * 9, increment=0.05), [1.0, 2.0, 0.0])
-    before, after = plain.field(0.0).cells, wary.field(0.0).cells
-    changed = before != after
-    assert (after[changed] == 126).all() and (before[changed] < 126).all()
-    assert changed[40, 5] and not changed[40, 30], "behind it, and where it looked"
-    assert not changed[before >= 126].any(), "what is in the way stays so"
-
-
 def test_beams_touch_the_cells_that_a_slow_reference_finds(rng: np.random.Generator) -> None:
     size, resolution = 40, 0.05
     cells = [[box(j, i, j + 1, i + 1) for j in range(size)] for i in range(size)]
