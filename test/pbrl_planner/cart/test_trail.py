@@ -24,7 +24,8 @@ def come(poses: np.ndarray) -> Trail:
 def test_back_leads_along_the_poses_that_were_come_by_as_far_as_asked() -> None:
     poses = way(400)
     back = come(poses).back(1.5)
-    assert np.hypot(*(back[0] - poses[-1])[:2]) < STEP
+    off = back[0] - poses[-1]
+    assert np.abs(np.array([*off[:2], np.angle(np.exp(1j * off[2])), off[3]])).max() < 1e-9, "from where they are"
     length = np.hypot(*np.diff(back[:, :2], axis=0).T).sum()
     assert 1.5 <= length < 1.5 + 2.0 * STEP
     for pose in back:

@@ -41,9 +41,11 @@ class Trail:
 
     def __init__(self) -> None:
         self._poses: list[Array] = []
+        self._here: Array | None = None
 
     def at(self, pose: Array) -> None:
         """Take in where they are (4,) [m, m, rad, rad]."""
+        self._here = np.array(pose, dtype=float)
         if self._poses:
             moved = pose - self._poses[-1]
             moved[2] = wrap(float(moved[2]))
@@ -61,12 +63,14 @@ class Trail:
             None where there is next to no way back.
         """
         poses = np.array(self._poses[::-1]).reshape(-1, 4)
+        if self._here is not None and (self._here != poses[0]).any():
+            poses = np.vstack((self._here, poses))
         passed = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))))
         if not len(poses) or passed[-1] < LEAST:
             return None
         count = min(int(np.searchsorted(passed, way)) + 1, len(poses))
-        self._poses = self._poses[: len(self._poses) - count + 1]
-        back = poses[:count]
+        self._poses, self._here = list(poses[count - 1 :][::-1]), None
+        back = poses[:count].copy()
         # Headings beside each other, not a turn apart.
         back[:, 2] = np.unwrap(back[:, 2])
         return back

@@ -88,7 +88,7 @@ class Costmap:
         self._evidence = np.zeros(shape, dtype=np.uint8)
         self._looked = np.zeros(shape, dtype=np.uint8)
         self._touched = np.zeros(shape, dtype=np.uint8)
-        self._last = np.full(shape, -np.inf)
+        self._last, self._came, self._went = (np.full(shape, -np.inf) for _ in range(3))
         self._corner = self._corner_for(centre)
         self._known: NDArray[np.int8] | None = None
         self._overhang: Overhang | None = None  # voxels are for those who have a laser that nods
@@ -146,8 +146,10 @@ class Costmap:
         if (dx, dy) == (0, 0):
             return
         self._corner, self._known = corner, None
-        for layer, blank in ((self._evidence, 0), (self._looked, 0), (self._last, -np.inf)):
-            roll(layer, dy, dx, blank)
+        for counts in (self._evidence, self._looked):
+            roll(counts, dy, dx, 0)
+        for times in (self._last, self._came, self._went):
+            roll(times, dy, dx, -np.inf)
         if self._overhang is not None:
             self._overhang.roll(dy, dx)
 
@@ -199,7 +201,11 @@ class Costmap:
             self._evidence,
             self._looked,
             self._last,
+            self._came,
+            self._went,
         )
+        if self._overhang is not None:
+            self._overhang.go_with(scan.time, self._evidence, self._last, self._came, self._went)
         self.time = max(self.time, scan.time)
         return ScanReport(occupied, freed, mine)
 

@@ -101,6 +101,37 @@ class Overhang:
         self.time = max(self.time, scan.time)
         return taken, freed, mine
 
+    def go_with(self, now: float, floor: NDArray[np.uint8], seen: Array, came: Array, went: Array) -> int:
+        """Clear what is over something that has gone from the floor by `now` [s]; return how many columns got free.
+
+        Args:
+            now: [s].
+            floor: (rows, columns) evidence of what is on the floor.
+            seen: (rows, columns) when something was last seen on it [s].
+            came: (rows, columns) when that came [s].
+            went: (rows, columns) when a cell was seen to be left [s]; what is settled is taken out: -inf.
+        """
+        settings = self._settings
+        return int(
+            kernel.go_with(
+                now,
+                settings.fleeting,
+                round(settings.about / self._resolution),
+                settings.slack,
+                floor,
+                seen,
+                came,
+                went,
+                self._evidence,
+                self._count,
+                self._last,
+                self._patch,
+                self._above,
+                self._right,
+                self._patches,
+            )
+        )
+
     def occupied(self, now: float) -> Mask:
         """Return in which columns (rows, columns) something is, as of `now` [s]; what is too old is forgotten first."""
         kernel.forget_columns(

@@ -226,6 +226,86 @@ def see_through(
 
 
 @njit(**LEAF)
+def go_with(
+    now: float,
+    patience: float,
+    radius: int,
+    slack: float,
+    floor: Byte,
+    seen: Array,
+    came: Array,
+    went: Array,
+    evidence: Byte,
+    count: Byte,
+    last: Array,
+    patch: int,
+    above: int,
+    right: int,
+    patches: Array,
+) -> int:
+    """Clear what is over something that has gone from the floor; return how many columns got free.
+
+    Who walks off takes their trunk along: where nothing stands any more about a cell that something has left, what came
+    over it together with that, and was not seen there since, has gone as well. What was over the place before stays.
+
+    Args:
+        now: [s].
+        patience: for which it is waited that nothing is about a cell that was left [s].
+        radius: about such a cell [cells].
+        slack: by which what is seen over the floor may come sooner, or be seen later, than what is on it [s].
+        floor: (rows, columns) evidence of what is on the floor.
+        seen: (rows, columns) when something was last seen on it [s].
+        came: (rows, columns) when that came [s].
+        went: (rows, columns) when a cell was seen to be left [s], in and out; -inf elsewhere.
+        evidence: (rows, columns, levels), in and out.
+        count: (rows, columns) voxels of a column that are occupied, in and out.
+        last: (rows, columns) when something was last seen in a column [s].
+        patch: see `mark_ends`, as are all that are not told here.
+        above: row of the window's corner.
+        right: its column.
+        patches: (m, n, 2), in and out.
+    """
+    rows, columns, levels = evidence.shape
+    freed = 0
+    for i in range(rows):
+        for j in range(columns):
+            if went[i, j] == -math.inf:
+                continue
+            if now - went[i, j] > patience:
+                went[i, j] = -math.inf
+                continue
+            top, bottom = max(i - radius, 0), min(i + radius + 1, rows)
+            left, end = max(j - radius, 0), min(j + radius + 1, columns)
+            stands = False
+            for k in range(top, bottom):
+                for m in range(left, end):
+                    near = (k - i) ** 2 + (m - j) ** 2 <= radius * radius
+                    stands = stands or (near and floor[k, m] > 0)
+                if stands:
+                    break
+            if stands:
+                continue
+            went[i, j] = -math.inf
+            for k in range(top, bottom):
+                for m in range(left, end):
+                    if count[k, m] == 0 or (k - i) ** 2 + (m - j) ** 2 > radius * radius:
+                        continue
+                    spell = patches[(k + above) // patch % patches.shape[0], (m + right) // patch % patches.shape[1]]
+                    if last[k, m] > seen[i, j] + slack or spell[0] < came[i, j] - slack:
+                        continue
+                    for h in range(levels):
+                        evidence[k, m, h] = 0
+                    count[k, m] = 0
+                    freed += 1
+            for k in range(top, bottom):
+                for m in range(left, end):
+                    spell = patches[(k + above) // patch % patches.shape[0], (m + right) // patch % patches.shape[1]]
+                    if spell[0] >= came[i, j] - slack and spell[1] <= seen[i, j] + slack:
+                        spell[0], spell[1] = math.inf, -math.inf
+    return freed
+
+
+@njit(**LEAF)
 def forget_columns(
     now: float, fleeting: float, memory: float, real: Mask, evidence: Byte, count: Byte, last: Array
 ) -> int:

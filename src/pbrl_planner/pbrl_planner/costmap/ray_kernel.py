@@ -143,7 +143,16 @@ def trace(
 
 @njit(**LEAF)
 def believe(
-    touched: Byte, time: float, hit: int, miss: int, most: int, evidence: Byte, looked: Byte, last: Array
+    touched: Byte,
+    time: float,
+    hit: int,
+    miss: int,
+    most: int,
+    evidence: Byte,
+    looked: Byte,
+    last: Array,
+    came: Array,
+    went: Array,
 ) -> tuple[int, int]:
     """Bring evidence up to date with a scan, and forget the scan; return how many cells got occupied, and free.
 
@@ -156,6 +165,8 @@ def believe(
         evidence: (rows, columns), in and out.
         looked: (rows, columns) whether a cell was ever seen, in and out.
         last: (rows, columns) when something was last seen in it [s], in and out.
+        came: (rows, columns) when that came, in a cell that was free until then [s], in and out.
+        went: (rows, columns) when a cell that was occupied was seen to be free [s], in and out; -inf elsewhere.
     """
     taken = freed = 0
     for i in range(touched.shape[0]):
@@ -169,10 +180,15 @@ def believe(
             if what == HIT:
                 evidence[i, j] = min(before + hit, most)
                 last[i, j] = max(time, last[i, j])
-                taken += before == 0
+                went[i, j] = -math.inf
+                if before == 0:
+                    came[i, j] = time
+                    taken += 1
             elif before > 0:
                 evidence[i, j] = max(before - miss, 0)
-                freed += before <= miss
+                if before <= miss:
+                    went[i, j] = time
+                    freed += 1
     return taken, freed
 
 

@@ -79,6 +79,9 @@ class OverhangSettings(Section):
             who walks has gone on.
         fleeting: [s] that marks stay over a patch where nothing has settled, and nobody looks any more.
         memory: [s] that they do where something has.
+        about: [m] about what stands on the floor, as the level laser sees it, within which what came over the floor
+            together with it goes with it.
+        slack: [s] between the two's coming, and between the two's last being seen.
     """
 
     lowest: Annotated[NotNegative, Field(le=10.0)] = 0.10
@@ -94,6 +97,8 @@ class OverhangSettings(Section):
     settled: Positive = 1.5
     fleeting: Positive = 5.0
     memory: Positive = 60.0
+    about: Annotated[NotNegative, Field(le=2.0)] = 0.35
+    slack: NotNegative = 1.5
 
     @model_validator(mode="after")
     def _stacks(self) -> Self:
