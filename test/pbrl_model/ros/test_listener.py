@@ -114,6 +114,21 @@ def test_only_our_own_robot_is_heard_and_by_the_names_of_the_contract(context: C
     listener.stop()
 
 
+def test_it_keeps_its_name_where_its_process_is_told_what_the_other_node_is_called(
+    monkeypatch: pytest.MonkeyPatch, domain: int
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    context = Context()
+    rclpy.init(args=["--ros-args", "-r", "__node:=mismatch", "-r", "__ns:=/ours"], context=context, domain_id=domain)
+    node = Node("mismatch_node", context=context)
+    listener = RecordingListener(f"{node.get_name()}_listener", context, namespace=node.get_namespace())
+    listener.start()
+    assert node.get_fully_qualified_name() == "/ours/mismatch"
+    assert listener.get_fully_qualified_name() == "/ours/mismatch_listener"
+    listener.stop()
+    rclpy.try_shutdown(context=context)
+
+
 def test_nothing_heard_is_an_error_that_says_so(context: Context) -> None:
     listener = RecordingListener("listener", context)
     with pytest.raises(BagError, match="got no message"):

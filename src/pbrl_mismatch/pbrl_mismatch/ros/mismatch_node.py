@@ -67,7 +67,7 @@ class MismatchNode(Node):
         chosen = DiagnoseOptions(without=tuple(without), workers=workers, seed=seed)
         self._doing, self._alarms = "watches; no alarm so far", 0
         self._mismatches = self.create_publisher(Mismatches, "mismatches", LATCHED)
-        self.listener = RecordingListener("mismatch_node_listener", context, memory, self.get_namespace())
+        self.listener = RecordingListener(f"{self.get_name()}_listener", context, memory, self.get_namespace())
         self._watcher = Watcher(
             MismatchMonitor(monitor),
             self.listener,

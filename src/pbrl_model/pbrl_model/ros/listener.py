@@ -53,7 +53,13 @@ class RecordingListener(Node):
         namespace: str = "/",
     ):
         super().__init__(
-            name, context=context, namespace=namespace, start_parameter_services=False, enable_rosout=False
+            name,
+            context=context,
+            namespace=namespace,
+            # A process is told what its node is called by `__node`, which would hold for all nodes in it.
+            cli_args=["--ros-args", "-r", f"__node:={name}"],
+            start_parameter_services=False,
+            enable_rosout=False,
         )
         self._builder = RecordingBuilder()
         self._heard = Heard(round(memory * 1e6))

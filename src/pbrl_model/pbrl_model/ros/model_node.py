@@ -79,7 +79,7 @@ class ModelNode(Node):
         self._worker: OnlineWorker | None = None
         self._models = self.create_publisher(ObjectModels, "object_models", LATCHED)
         self._markers = self.create_publisher(MarkerArray, "object_models/markers", QoSProfile(depth=1))
-        self.listener = RecordingListener("model_node_listener", context, memory, self.get_namespace())
+        self.listener = RecordingListener(f"{self.get_name()}_listener", context, memory, self.get_namespace())
         # In the listener's thread, as this node's own is busy while it answers /learn.
         self.listener.tell(Diagnostics(self, self._doing, numbers=self._numbers, runs_in=self.listener))
         self.create_service(LearnModel, "learn", self._learn)
