@@ -16,15 +16,15 @@ from pbrl_control.cart import (
     CartCommand,
     CartController,
     CartPlan,
-    Cause,
     DriveStatus,
 )
 from pbrl_control.planar import Array, compose, wrap
-from pbrl_planner.cart.navigator import PATIENCE, Answer, Navigator
+from pbrl_planner.cart.leg import Drove, Leg, LegState, Order
+from pbrl_planner.cart.navigator import PATIENCE, Navigator
 from pbrl_planner.cart.outline import motions
+from pbrl_planner.cart.query import OUTCOMES, Outcome
 from pbrl_planner.cart.settings import CartParameters, load_cart
 from pbrl_planner.cart.trail import Headway, Trail
-from pbrl_planner.costmap import CostField
 from pbrl_planner.lattice import LatticePlan, LatticeSettings, Motions
 from pr2_cart_sim.scene import OfficeScene
 from pr2_cart_sim.sensing import in_base
@@ -35,22 +35,29 @@ TICK = 0.05
 SIDES = ("left", "right")
 LONGEST = 300.0
 """Simulated time after which a leg is given up [s]."""
-IN_THE_WAY = (Cause.OBSTACLE, Cause.FOOTPRINT)
-"""Why a plan is given up that may be good again in a moment."""
 TRACED = 0.5
 """Between two points of the trace [s]."""
+ENDS = {
+    DriveStatus.ARRIVED: Drove.ARRIVED,
+    DriveStatus.REPLAN: Drove.REPLAN,
+    DriveStatus.FAILED: Drove.GRIP_LOST,
+}
 
 
 @dataclass
 class _Going:
-    """What is driven: a plan, its controller, when it began, since when it stands before something.
+    """What is driven.
 
-    Without a plan it is the way back along where they came.
+    Attributes:
+        poses: (n, 4) of it [m, rad].
+        controller: drives along them.
+        plan: that they end with; None: they lead back.
+        blocked: since when it stands before something [s].
     """
 
-    plan: LatticePlan | None
+    poses: Array
     controller: CartController
-    since: float
+    plan: LatticePlan | None = None
     blocked: float | None = None
 
 
@@ -97,12 +104,12 @@ class CartRun:
         self.last_plan: LatticePlan | None = None
         told = told or load_cart()
         self._settings, self._navigation = told.controller, told.navigation
+        self._leg = Leg(told.navigation, 0.0)
         self._going: _Going | None = None
-        self._sent = np.zeros(4)
-        self._next_tick, self._next_plan, self._next_trace = 0.0, 0.0, 0.0
-        self._pause = self._navigation.retry
+        self._left: tuple[LatticePlan, Array] | None = None
+        self._aim, self._sent = np.zeros(4), np.zeros(4)
+        self._next_tick, self._next_trace = 0.0, 0.0
         self._trail, self._headway = Trail(), Headway()
-        self._stuck: float | None = None
 
     def step(self) -> None:
         """Advance the simulator by one step; perceive, and control at each tick."""
@@ -115,19 +122,20 @@ class CartRun:
 
     def _tick(self, now: float) -> None:
         command: CartCommand | None = None
-        if self._going is None and now >= self._next_plan:
-            self._set_out(now)
-        percept = self.senses.percept(now)
-        if self._going is not None and self._going.plan is not None and (here := self.senses.state(now)) is not None:
+        here, percept = self.senses.state(now), self.senses.percept(now)
+        if here is not None and self.senses.whole is not None and self.senses.body is not None:
+            self._do(now, self._leg.tick(now))
+        if self._going is not None and not self._leg.backing and here is not None:
             self._trail.at(here)
-            self._stuck = None if self._headway.at(here) else self._stuck
+            if self._headway.at(here):
+                self._leg.got_on()
         if self._going is not None and percept is not None:
             began = thread_time()
             command = self._going.controller.step(now, percept)
             self.ticks.seconds.append(round(thread_time() - began, 7))
             self._send(command)
             self._note_errors(command)
-            self._heed(now, command)
+            self._heed(now, self._going, command)
         else:
             self.session.command_base(0.0, 0.0, 0.0)
             self._sent = np.zeros(4)
@@ -142,94 +150,99 @@ class CartRun:
                 self.session.command_arm(side, rates.tolist())
         self._sent = np.append(command.twist, command.articulation_rate)
 
-    def _heed(self, now: float, command: CartCommand) -> None:
-        """Do what the controller's status asks for."""
-        going = self._going
-        assert going is not None, "called while a plan is driven"
-        if command.status is DriveStatus.FAILED:
-            self.ended = command.reason
-        elif going.plan is None:
-            self._heed_way_back(now, command)
-        elif command.status is DriveStatus.ARRIVED:
-            self.reached, self.ended = True, "at the goal"
-        elif command.status is DriveStatus.REPLAN:
-            self.senses.recover(now)
-            self._give_up(now, going, going.plan, command)
-        elif command.status is DriveStatus.BLOCKED:
-            going.blocked = now if going.blocked is None else going.blocked
-            if now - going.blocked >= self._navigation.blocked and now >= self._next_plan:
-                self._set_out(now)
-        else:
+    def _heed(self, now: float, going: _Going, command: CartCommand) -> None:
+        """Tell the leg how the drive goes on."""
+        ended = ENDS.get(command.status)
+        if ended is not None:
+            self._left = None if going.plan is None else (going.plan, rest(going.poses, command.goal))
+            self._going = None
+            self._do(now, self._leg.drove(now, ended, command.reason))
+            return
+        if command.status is not DriveStatus.BLOCKED:
             going.blocked = None
-            if now - going.since >= self._navigation.refresh and now >= self._next_plan:
-                self._go_over(now, going, going.plan, command.goal)
+        elif going.blocked is None:
+            going.blocked = now
+        blocked = 0.0 if going.blocked is None else now - going.blocked
+        self._aim = command.goal
+        self._do(now, self._leg.driving(now, blocked, command.reason))
 
-    def _heed_way_back(self, now: float, command: CartCommand) -> None:
-        """At its end, or where it is not free, wait for who wants to get by."""
-        if command.status in (DriveStatus.ARRIVED, DriveStatus.REPLAN):
-            told = self._navigation
-            self._going, self._next_plan = None, now + told.room
-            # Where that was not far enough, it goes on soon.
-            self._stuck = now - told.make_way + 2.0 * told.room
-        if command.status is DriveStatus.REPLAN:
+    def _do(self, now: float, order: Order) -> None:
+        """Do what is due; the planner answers at once."""
+        if order is Order.PLAN:
+            self._set_out(now)
+        elif order is Order.REFINE:
+            self._go_over(now)
+        elif order is Order.GO_ON:
+            assert self._left is not None, "called after a drive was given up"
+            self._drive(self._left[1], self._left[0])
+        elif order is Order.BACK:
+            self._make_way()
+        elif order is Order.CLEAR:
             self.senses.recover(now)
+        elif order is Order.FORGET:
+            if any(len(each.places) for each in self.senses.forget_unseen(now, self._navigation.unseen)):
+                self._leg.forgot(now)
+        elif order is Order.END:
+            self._going, self.ended = None, self._leg.sentence
+            self.reached = self._leg.state is LegState.ARRIVED
 
-    def _make_way(self, now: float) -> None:
+    def _make_way(self) -> None:
         """Go back along where they came: who stands in the way may be shut in by them."""
-        self._stuck, body = None, self.senses.body
-        poses = self._trail.back(self._navigation.way_back)
-        if poses is not None and body is not None:
-            self._going = _Going(None, self._controller(poses, body), now)
-
-    def _give_up(self, now: float, going: _Going, driven: LatticePlan, command: CartCommand) -> None:
-        """Have another plan made; while there is none, wait on what is left of this one for the way to get free."""
-        self._going = None
-        if command.cause in IN_THE_WAY and self.senses.body is not None:
-            left = self._controller(rest(driven, command.goal), self.senses.body)
-            self._going = _Going(driven, left, going.since, now if going.blocked is None else going.blocked)
+        poses, self._going = self._trail.back(self._navigation.way_back), None
+        if poses is None:
+            self._leg.nothing_behind()
+        else:
+            self._drive(poses)
 
     def _set_out(self, now: float) -> None:
-        """Plan from here, and drive that; without a plan go on with the old one, if any, and try again later."""
-        here, floor, body = self.senses.state(now), self.senses.floor(now), self.senses.body
-        if here is None or floor is None or body is None:
-            return
-        made = self._asked(now, floor, here)
-        if made is None and self.navigator.calls[-1].answer is Answer.SHUT_IN:
-            self.senses.recover(now)
-        elif made is None and any(len(each.places) for each in self.senses.forget_unseen(now, self._navigation.unseen)):
-            self._pause = self._navigation.retry
-            self._next_plan = now + self._pause
-        if made is None:
-            self._stuck = now if self._stuck is None else self._stuck
-            if now - self._stuck > self._navigation.make_way:
-                self._make_way(now)
-            return
-        self._going = _Going(made, self._controller(np.vstack([here, made.poses]), body), now)
+        """Plan from here, and drive that."""
+        here = self.senses.state(now)
+        made = None if here is None else self._asked(now, here)
+        order = self._leg.planned(now, *self._answer(made))
+        if order is Order.FOLLOW:
+            assert made is not None and here is not None, "there is a path"
+            self._drive(np.vstack([here, made.poses]), made)
+        else:
+            self._do(now, order)
 
-    def _asked(self, now: float, floor: CostField, begin: Array) -> LatticePlan | None:
-        """Return a plan from a pose (4,) on, and take note of when to ask again."""
+    def _go_over(self, now: float) -> None:
+        """Plan again from a little further along the plan that is driven; drive that where it is another."""
+        going = self._going
+        head = None if going is None or going.plan is None else onward(going.plan, self._aim)
+        if head is None:
+            self._leg.nothing_ahead(now)
+            return
+        assert going is not None and going.plan is not None, "there is something ahead"
+        driven, made = going.plan, self._asked(now, head[-1])
+        order = self._leg.planned(now, *self._answer(made))
+        if order is Order.SWITCH:
+            assert made is not None, "there is a path"
+            if not np.array_equal(made.primitives, driven.primitives[-len(made.primitives) :]):
+                self._drive(np.vstack([head, made.poses]), made)
+        else:
+            self._do(now, order)
+
+    def _asked(self, now: float, begin: Array) -> LatticePlan | None:
+        """Return a plan from a pose (4,) on."""
+        floor = self.senses.floor(now)
+        assert floor is not None, "asked once a map has come"
         if not self.navigator.calls:  # a robot that waits for its goal has the time
             self.navigator.prepare(floor)
         made = self.navigator.plan(now, floor, begin, self.goal)
-        found = made is not None
-        retry, most = self._navigation.retry, self._navigation.retry_most
-        late = now - self._next_plan > most
-        self._next_plan = now + (retry if found or late else self._pause)
-        self._pause = retry if found else min(2.0 * (retry if late else self._pause), most)
-        self.last_plan = made if found else self.last_plan
+        self.last_plan = made if made is not None else self.last_plan
         return made
 
-    def _go_over(self, now: float, going: _Going, driven: LatticePlan, aim: Array) -> None:
-        """Plan again from a little further along the plan that is driven; drive that where it is another."""
-        floor, body = self.senses.floor(now), self.senses.body
-        head = onward(driven, aim)
-        if floor is None or body is None or head is None:
-            return
-        going.since = now
-        made = self._asked(now, floor, head[-1])
-        if made is None or np.array_equal(made.primitives, driven.primitives[-len(made.primitives) :]):
-            return
-        self._going = _Going(made, self._controller(np.vstack([head, made.poses]), body), now)
+    def _answer(self, made: LatticePlan | None) -> tuple[Outcome, str]:
+        call = self.navigator.calls[-1] if self.navigator.calls else None
+        if call is None:
+            return Outcome.NOT_READY, "it is not known where robot and cart are"
+        return OUTCOMES[call.answer], f"{call.answer} {call.reason}".strip()
+
+    def _drive(self, poses: Array, plan: LatticePlan | None = None) -> None:
+        """Drive along poses (m, 4), of which the first is about here, and the last ones those of a plan."""
+        body = self.senses.body
+        assert body is not None, "a cart is held"
+        self._going = _Going(poses, self._controller(poses, body), plan)
 
     def _controller(self, poses: Array, body: CartBody) -> CartController:
         """Return a controller that goes along poses (m, 4), of which the first is about here."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -221,7 +222,11 @@ class Deaf:
     """Senses that know where everything is, and take note of what they are told to forget."""
 
     def __init__(self) -> None:
-        self.body, self.stale, self.recovered = CartBody.of(pr2_with(CART)), 0, 0
+        self.body, self.whole = CartBody.of(pr2_with(CART)), free_field()
+        self.stale = self.recovered = 0
+
+    def percept(self, now: float) -> None:
+        return None
 
     def state(self, now: float) -> np.ndarray:
         return np.array([1.025, 2.025, 0.0, 0.0])
@@ -237,16 +242,27 @@ class Deaf:
         return [Recovery("", np.zeros((gone, 2)), np.zeros(gone, dtype=int), 0)]
 
 
-def waiting_run(made: list[LatticePlan | None]) -> CartRun:
+class Still:
+    """A session in which nothing moves."""
+
+    time = 0.0
+
+    def command_base(self, *rates: float) -> None:
+        assert not np.any(rates)
+
+
+def waiting_run(made: list[LatticePlan | None], monkeypatch: pytest.MonkeyPatch) -> CartRun:
     """A run whose planner answers what it is told to."""
-    run = CartRun(None, np.array([3.025, 2.625, 0.0]), motions(1.0, 0.55, True))
+    run = CartRun(Still(), np.array([3.025, 2.625, 0.0]), motions(1.0, 0.55, True))
     run.senses = Deaf()
 
     def answer(now: float, *_: object) -> LatticePlan | None:
-        run.navigator.calls.append(call(Answer.PLAN if made[0] else Answer.NO_PATH))
+        run.navigator.calls.append(replace(call(Answer.PLAN if made[0] else Answer.NO_PATH), time=now))
         return made.pop(0)
 
-    run.navigator.plan = answer
+    monkeypatch.setattr(run.navigator, "plan", answer)
+    monkeypatch.setattr(run.navigator, "prepare", lambda field: None)
+    monkeypatch.setattr(run, "_traced", lambda now, command: None)
     return run
 
 
@@ -255,49 +271,43 @@ def simple_plan() -> LatticePlan:
     return plan(LatticeProblem(lattice, (1.025, 2.025, 0.0), (3.025, 2.625, 0.0)))
 
 
-def test_where_there_is_no_path_it_waits_longer_and_longer_and_asks_again() -> None:
-    made = simple_plan()
-    run, asked = waiting_run([None, None, None, None, made, None]), []
+def test_where_there_is_no_path_it_waits_longer_and_longer_and_asks_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = waiting_run([None, None, None, None, simple_plan()], monkeypatch)
     for tick in range(1000):
-        now = 0.05 * tick
-        if now >= run._next_plan and len(asked) < 6:
-            run._set_out(now)
-            asked.append(now)
-    waits = [TOLD.retry, 2 * TOLD.retry, TOLD.retry_most, TOLD.retry_most, TOLD.retry]
-    assert np.diff(asked) == pytest.approx(waits, abs=0.051)
-    assert run._going is not None and run._going.plan is made, "a failure does not end what is driven"
+        run._tick(0.05 * tick)
+    waits = [TOLD.retry, 2 * TOLD.retry, TOLD.retry_most, TOLD.retry_most]
+    assert np.diff([each.time for each in run.navigator.calls]) == pytest.approx(waits, abs=0.051)
+    assert run._going is not None and not run.ended
 
 
-def test_where_something_could_be_forgotten_it_asks_again_soon() -> None:
-    run = waiting_run([None, None, None, simple_plan()])
-    run._set_out(0.0)
-    run._set_out(2.0)
-    run.senses.stale = 3
-    run._set_out(6.0)
-    assert run._next_plan == 6.0 + TOLD.retry and run.senses.recovered == 0 and run.senses.stale == 0
-    run._set_out(8.0)
-    assert run._going is not None
+def test_where_something_could_be_forgotten_it_asks_again_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = waiting_run([None, None, None, simple_plan()], monkeypatch)
+    for now in (0.0, 2.0, 6.0, 7.9, 8.0):
+        run.senses.stale = 3 if now == 6.0 else 0
+        run._tick(now)
+        assert len(run.navigator.calls) == {0.0: 1, 2.0: 2, 6.0: 3, 7.9: 3, 8.0: 4}[now]
+    assert run._going is not None and run.senses.recovered == 0
 
 
-@pytest.mark.parametrize(("cause", "kept"), [(Cause.OBSTACLE, True), (Cause.FOOTPRINT, True), (Cause.OFF_PLAN, False)])
-def test_a_plan_that_somebody_stands_on_is_waited_on(cause: Cause, kept: bool) -> None:
+def test_a_plan_that_somebody_stands_on_is_waited_on(monkeypatch: pytest.MonkeyPatch) -> None:
     made = simple_plan()
-    run = waiting_run([made])
-    run._set_out(0.0)
+    run = waiting_run([made, None, None], monkeypatch)
+    run._tick(0.0)
     going, goal = run._going, made.poses[7]
-    nothing = np.zeros(4)
-    command = CartCommand(nothing[:3], 0.0, DriveStatus.REPLAN, cause, "", goal, nothing, 0.0, 0.0)
-    run._heed(8.0, command)
-    assert run.senses.recovered == 1 and (run._going is not None) is kept
-    if kept:
-        assert run._going.plan is made and run._going.controller is not going.controller
-        assert run._going.blocked == 8.0, "a way round is looked for soon"
+    command = CartCommand(
+        np.zeros(3), 0.0, DriveStatus.REPLAN, Cause.OBSTACLE, "somebody", goal, np.zeros(4), 0.0, 0.0, None
+    )
+    run._heed(8.0, going, command)
+    assert run.senses.recovered == 1 and run._going is None
+    run._tick(8.05)
+    assert run._going is not None and run._going.controller is not going.controller
+    assert np.array_equal(run._going.poses, made.poses[7:])
 
 
 def test_the_rest_of_a_plan_begins_where_it_is_and_ends_where_it_ends() -> None:
     made = simple_plan()
     for number in (0, 5, len(made.poses) - 1):
         turned = made.poses[number] + [0.0, 0.0, 2.0 * math.pi, 0.0]
-        left = rest(made, turned)
+        left = rest(made.poses, turned)
         assert np.array_equal(left[0], turned) and len(left) == len(made.poses) - number
         assert number == len(made.poses) - 1 or np.array_equal(left[-1], made.poses[-1])

@@ -88,6 +88,47 @@ def test_a_drive_that_is_given_up_is_planned_again() -> None:
     assert leg.tick(2.2) is Order.PLAN and leg.state is LegState.PLANNING
 
 
+def test_while_there_is_no_other_path_what_is_left_of_it_is_gone_on_with_once_it_is_free() -> None:
+    leg = driving()
+    leg.driving(3.0, 2.0, "somebody")
+    leg.planned(3.1, Outcome.NO_PATH, "none")
+    assert leg.drove(6.0, Drove.REPLAN, "somebody, for more than 5 s") is Order.CLEAR
+    assert leg.tick(6.05) is Order.PLAN, "at once, however long the pause was"
+    assert leg.planned(6.1, Outcome.NO_PATH, "none") is Order.GO_ON and leg.state is LegState.DRIVING
+    assert leg.driving(6.2, 0.0, "") is Order.NOTHING and leg.sentence == "on the way"
+    assert leg.driving(30.0, 0.0, "") is Order.REFINE
+
+
+def test_who_is_shut_in_clears_before_it_goes_on() -> None:
+    leg = driving()
+    leg.drove(6.0, Drove.REPLAN, "")
+    leg.tick(6.0)
+    assert leg.planned(6.1, Outcome.START_OCCUPIED, "") is Order.CLEAR and leg.state is LegState.WAITING
+    leg.tick(20.0)
+    assert leg.planned(20.1, Outcome.NO_PATH, "") is Order.GO_ON
+
+
+def test_who_stands_before_something_gives_up_in_the_end_and_who_gets_on_does_not() -> None:
+    for gets_on in (False, True):
+        leg = driving()
+        orders = set()
+        for now in np.arange(3.0, 60.0, 0.5):
+            if gets_on and now % 10.0 == 0.0:
+                leg.got_on()
+            if leg.driving(now, 5.0, "somebody") is Order.PLAN:
+                orders.add(leg.planned(now, Outcome.NO_PATH, "none"))
+        assert (leg.state is LegState.FAILED) is not gets_on and (Order.END in orders) is not gets_on
+
+
+def test_where_something_was_forgotten_it_is_asked_again_soon() -> None:
+    leg = Leg(SETTINGS, 0.0)
+    for now in (0.0, 2.0, 6.0):
+        assert leg.tick(now) is Order.PLAN
+        leg.planned(now, Outcome.NO_PATH, "")
+    leg.forgot(6.0)
+    assert leg.tick(7.9) is Order.NOTHING and leg.tick(8.0) is Order.PLAN
+
+
 @pytest.mark.parametrize("ended", [Drove.GRIP_LOST, Drove.REFUSED, Drove.STOPPED])
 def test_other_ends_of_a_drive_end_the_goal(ended: Drove) -> None:
     leg = driving()
@@ -110,15 +151,17 @@ def test_no_order_of_events_leaves_it_with_nothing_to_do_for_ever() -> None:
             now += float(rng.uniform(0.1, 3.0))
             order = Order.NOTHING
             if asked and rng.random() < 0.5:
-                asked, order = False, leg.planned(now, rng.choice(list(Outcome)), "")
+                asked, order = False, leg.planned(now, list(Outcome)[rng.integers(len(Outcome))], "")
             elif driven and rng.random() < 0.3:
-                driven, order = False, leg.drove(now, rng.choice(list(Drove)), "")
+                driven, order = False, leg.drove(now, list(Drove)[rng.integers(len(Drove))], "")
             elif driven:
                 order = leg.driving(now, float(rng.uniform(0.0, 4.0)), "")
             else:
                 order = leg.tick(now)
             assert not (order is Order.PLAN and asked), "never two questions"
-            asked, driven = asked or order is Order.PLAN, driven or order is Order.FOLLOW
+            asked = asked or order in (Order.PLAN, Order.REFINE)
+            driven = driven or order in (Order.FOLLOW, Order.GO_ON, Order.BACK)
+            assert driven or not leg.backing
             if order is Order.END:
                 assert leg.state in ENDED
                 break

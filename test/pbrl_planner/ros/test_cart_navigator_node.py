@@ -230,11 +230,35 @@ def test_without_a_path_for_long_it_goes_back_along_where_it_came_waits_and_asks
     back = np.array([each.pose.position.x for each in play.given[1].path.path.poses])
     assert back[0] == pytest.approx(LONG[100, 0]) and back[0] - back[-1] == pytest.approx(2.5, abs=0.06)
     assert (np.diff(back) < 0.0).all()
+    under_way(play, after(play, 0.5), len(back))
     play.ended(Follow.ARRIVED)
     play.says("waiting for who wants to get by")
     play.later(8.1)
+    while len(play.given) == 2:
+        question += 1
+        play.until(lambda question=question: len(play.asked) >= question)
+        play.answer(Plan.NO_PATH, "still shut", count=question)
+        play.until(lambda question=question: len(play.asked) > question or len(play.given) == 3)
+    further = np.array([each.pose.position.x for each in play.given[2].path.path.poses])
+    assert further[0] == pytest.approx(back[-1], abs=0.06) and (np.diff(further) < 0.0).all(), "not forth again"
+    play.ended(Follow.ARRIVED)
+    play.later(8.1)
     play.answer(Plan.FOUND, count=question + 1)
-    play.until(lambda: len(play.given) == 3)
+    play.until(lambda: len(play.given) == 4)
+
+
+def test_while_there_is_no_other_path_what_is_left_of_it_is_gone_on_with(play: Play) -> None:
+    play.stage.send("/goal_pose", goal(10.0))
+    play.answer(Plan.FOUND, poses=LONG)
+    play.until(lambda: play.given)
+    under_way(play, after(play, 1.0), 101)
+    play.ended(Follow.REPLAN, "somebody is in the way")
+    play.answer(Plan.NO_PATH, count=2)
+    play.until(lambda: len(play.given) == 2)
+    left = [each.pose.position.x for each in play.given[1].path.path.poses]
+    assert left == pytest.approx(LONG[100:, 0].tolist()) and play.cleared == 1
+    play.ended(Follow.ARRIVED)
+    play.says("arrived")
 
 
 def test_a_path_that_is_given_up_is_planned_again_on_cleared_costmaps(play: Play) -> None:

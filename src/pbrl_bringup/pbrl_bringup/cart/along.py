@@ -23,7 +23,7 @@ def onward(plan: LatticePlan, aim: Array) -> Array | None:
     Returns:
         None where the plan ends soon.
     """
-    here = _nearest(plan, aim)
+    here = _nearest(plan.poses, aim)
     left = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(plan.poses[here:], axis=0)).sum(axis=1))))
     ahead = [
         k
@@ -35,12 +35,12 @@ def onward(plan: LatticePlan, aim: Array) -> Array | None:
     return np.vstack([aim, plan.poses[here + 1 : ahead[0] + 1]])
 
 
-def rest(plan: LatticePlan, aim: Array) -> Array:
-    """Return what is left of a plan as poses (m, 4), from a pose (4,) of it that the controller goes for."""
-    return np.vstack([aim, plan.poses[_nearest(plan, aim) + 1 :]])
+def rest(poses: Array, aim: Array) -> Array:
+    """Return what is left of poses (n, 4) that are driven, from one of them (4,) that the controller goes for."""
+    return np.vstack([aim, poses[_nearest(poses, aim) + 1 :]])
 
 
-def _nearest(plan: LatticePlan, aim: Array) -> int:
-    off = plan.poses - aim
+def _nearest(poses: Array, aim: Array) -> int:
+    off = poses - aim
     off[:, 2] = np.mod(off[:, 2] + math.pi, 2.0 * math.pi) - math.pi
     return int(np.argmin(np.sum(off**2, axis=1)))

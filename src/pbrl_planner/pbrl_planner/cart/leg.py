@@ -38,6 +38,7 @@ class Order(StrEnum):
     REFINE = "ask the planner for a better path from a place ahead"
     FOLLOW = "drive along the path"
     SWITCH = "drive on to that place, and along the better path from there"
+    GO_ON = "drive on along what is left of the path that was given up, as soon as it is free"
     BACK = "go back along where robot and cart came"
     END = "say how it ended"
 
@@ -67,7 +68,7 @@ class Leg:
         self.began = now
         self.state, self.sentence = LegState.PLANNING, "looking for a path"
         self.plans = self.failures = 0
-        self._asked = self._driving = self._stands = self._refining = self._backing = False
+        self._asked = self._driving = self._stands = self._refining = self._backing = self._left = False
         self._since = now  # on this path
         self._next, self._pause = now, settings.retry
         self._without: float | None = None
@@ -91,25 +92,28 @@ class Leg:
             self._next, self._pause = now + self._settings.retry, self._settings.retry
             if self._driving and not self._stands:  # who was in the way is gone, and the path begins behind the robot
                 return Order.NOTHING
-            self._without, self._driving, self._stands, self._since = None, True, False, now
+            self._without, self._driving, self._stands, self._left, self._since = None, True, False, False, now
             return self._say(LegState.DRIVING, message, Order.FOLLOW)
         self.failures += 1
         self._next, self._pause = now + self._pause, min(2.0 * self._pause, self._settings.retry_most)
         if outcome in HOPELESS:
             return self._say(LegState.FAILED, message, Order.END)
         self._stuck = now if self._stuck is None else self._stuck
-        if now - self._stuck > self._settings.make_way:
-            self._stuck, self._driving, self._stands, self._backing = None, True, False, True
-            return self._say(LegState.DRIVING, f"going back to make way; {message}", Order.BACK)
-        if self._driving:
-            self.sentence = f"stands before something; {message}"
-            return Order.FORGET
         self._without = now if self._without is None else self._without
+        if now - self._stuck > self._settings.make_way:
+            self._stuck, self._driving, self._stands, self._left, self._backing = None, True, False, False, True
+            return self._say(LegState.DRIVING, f"going back to make way; {message}", Order.BACK)
         if now - self._without > self._settings.give_up:
             words = f"no path for {now - self._without:.0f} s; {message}"
             return self._say(LegState.FAILED, words, Order.END)
         # What is marked where the robot stands may never have been there; what is there is soon seen again.
         order = Order.CLEAR if outcome is Outcome.START_OCCUPIED else Order.FORGET
+        if self._left and order is Order.FORGET:
+            self._left, self._driving, self._stands, self._since = False, True, True, now
+            return self._say(LegState.DRIVING, f"stands before something; {message}", Order.GO_ON)
+        if self._driving:
+            self.sentence = f"stands before something; {message}"
+            return order
         return self._say(LegState.WAITING, message, order)
 
     def driving(self, now: float, blocked: float, reason: str) -> Order:
@@ -141,7 +145,12 @@ class Leg:
 
     def got_on(self) -> None:
         """Take in that there is headway: paths that are found and shut again at once are none."""
-        self._stuck = None
+        self._stuck = self._without = None
+
+    def forgot(self, now: float) -> None:
+        """Take in that something was taken out of the costmaps: there may be a path soon."""
+        self._pause = self._settings.retry
+        self._next = min(self._next, now + self._pause)
 
     def nothing_behind(self) -> None:
         """Take in that there is no way back: robot and cart have not come from anywhere."""
@@ -162,8 +171,15 @@ class Leg:
         if ended is Drove.ARRIVED:
             return self._say(LegState.ARRIVED, "at the goal", Order.END)
         if ended is Drove.REPLAN:
+            # While there is no other path the way on this one may get free.
+            self._left, self._next = True, min(self._next, now)
             return self._say(LegState.WAITING, message, Order.CLEAR)
         return self._say(LegState.FAILED, message or str(ended), Order.END)
+
+    @property
+    def backing(self) -> bool:
+        """Whether robot and cart go back to make way."""
+        return self._backing
 
     @property
     def asked(self) -> bool:

@@ -1,9 +1,10 @@
 """Brings robot and cart to a goal: from RViz on /goal_pose, or by the action /navigate_cart; the last one counts.
 
 It asks /plan_cart_path, hands the path to /follow_cart_path, and asks again where something stays in the way, a path
-was given up, or there was none: people leave. Where there is none for long it goes back along where it came, to make
-way for whom it may shut in. While it drives it looks for a better path, from a place ahead on the one that is driven.
-/cart_navigator/status (std_msgs/String) says where it is.
+was given up, or there was none: people leave. Meanwhile what is left of the path is gone on with as soon as that is
+free. Where there is none for long it goes back along where it came, to make way for whom it may shut in. While it
+drives it looks for a better path, from a place ahead on the one that is driven. /cart_navigator/status
+(std_msgs/String) says where it is.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from pbrl_planner.errors import PlannerError
 from pbrl_planner.ros.conversions import MAP, path_from_msg, path_to_msg, pose_in_map, pose_to_msg
 from pbrl_planner.ros.one_goal import OneGoal
 from pbrl_planner.ros.running import declare_settings, run_node
-from pbrl_planner.ros.saying import Saying
+from pbrl_planner.ros.saying import NOTHING_TO_CLEAR, Saying
 
 TICK = 0.1
 """[s] of the node's clock."""
@@ -76,6 +77,7 @@ class CartNavigatorNode(Node):
         self._leg: Leg | None = None
         self._number = 0
         self._drive: _Drive | None = None
+        self._left: Array | None = None
         self._trail, self._headway = Trail(), Headway()
         self._mending = False
         self._epsilon = self._remaining = 0.0
@@ -189,6 +191,8 @@ class CartNavigatorNode(Node):
             self._ask_ahead()
         elif order is Order.SWITCH:
             self._switch(path)
+        elif order is Order.GO_ON:
+            self._go_on()
         elif order is Order.BACK:
             self._go_back()
         elif order in self._mend:
@@ -266,6 +270,11 @@ class CartNavigatorNode(Node):
         )
         sent.add_done_callback(partial(self._on_followed, drive))
 
+    def _go_on(self) -> None:
+        """Drive what is left of the path that was given up: the controller waits until it is free."""
+        assert self._left is not None, "called after a drive was given up"
+        self._follow(path_to_msg(self._left, self._now()))
+
     def _go_back(self) -> None:
         """Drive back along what was driven; what is blocked on the old path is not wanted any more."""
         assert self._leg is not None
@@ -288,7 +297,7 @@ class CartNavigatorNode(Node):
         if drive is not self._drive or self._leg is None:
             return
         feedback = message.feedback
-        for pose in drive.poses[drive.passed : int(feedback.passed)]:
+        for pose in () if self._leg.backing else drive.poses[drive.passed : int(feedback.passed)]:
             self._trail.at(pose)
             if self._headway.at(pose):
                 self._leg.got_on()
@@ -298,7 +307,7 @@ class CartNavigatorNode(Node):
     def _on_drove(self, drive: _Drive, future: Future) -> None:
         if drive is not self._drive or self._leg is None:
             return
-        self._drive = None
+        self._drive, self._left = None, drive.poses[max(drive.passed - 1, 0) :]
         result = future.result().result
         self._do(self._leg.drove(self._now(), ENDS[result.outcome], result.message))
 
@@ -306,10 +315,15 @@ class CartNavigatorNode(Node):
         """Have the costmaps' node do what is ordered; nothing is planned before it has, if it is there."""
         if self._mend[order].service_is_ready():
             self._mending = True
-            self._mend[order].call_async(Trigger.Request()).add_done_callback(self._on_mended)
+            asked = self._mend[order].call_async(Trigger.Request())
+            asked.add_done_callback(partial(self._on_mended, order, self._number))
 
-    def _on_mended(self, _: Future) -> None:
+    def _on_mended(self, order: Order, number: int, future: Future) -> None:
         self._mending = False
+        answer = future.result()
+        something = answer is not None and answer.success and answer.message != NOTHING_TO_CLEAR
+        if order is Order.FORGET and something and number == self._number and self._leg is not None:
+            self._leg.forgot(self._now())
 
     # Small things
 

@@ -33,6 +33,7 @@ from pbrl_planner.ros.conversions import field_to_msg, map_from_msg, scan_from_m
 from pbrl_planner.ros.frames import Frames, NotYetError
 from pbrl_planner.ros.hearing import BASE, SAID, Hearing
 from pbrl_planner.ros.running import declare_settings, run_node
+from pbrl_planner.ros.saying import NOTHING_TO_CLEAR
 
 WAITING = 5
 """Scans of the nodding laser that wait at most for /tf to say how it stood."""
@@ -164,7 +165,7 @@ class CostmapNode(Node):
 
     def _told(self, steps: list[Recovery], response: Trigger.Response) -> Trigger.Response:
         words = "; ".join(f"{step.what}: {len(step.places)} cells" for step in steps if len(step.places))
-        response.success, response.message = True, words or "there was nothing to clear"
+        response.success, response.message = True, words or NOTHING_TO_CLEAR
         self.get_logger().info(response.message)
         self._tell_global()
         return response

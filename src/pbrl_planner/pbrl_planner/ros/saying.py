@@ -9,6 +9,8 @@ from std_msgs.msg import String
 
 from pbrl_control.ros.qos import LATCHED
 
+NOTHING_TO_CLEAR = "there was nothing to clear"
+"""What a service that takes something out of the costmaps answers where there was nothing."""
 NUMBERS = re.compile(r"[\d.]+")
 
 
