@@ -24,9 +24,9 @@ FURTHER = 1.1
 """Times the bound of the start, up to which the lower bound is made before there is a plan."""
 NEAR = 8
 """Cells from either end of the way within which no state is left out: there is little room where a robot stops."""
-SCOUTED = 30_000
-"""Expansions of a search that leaves states out, at most, before it leaves out fewer. To turn round in a room takes
-about half of them in blocks of 0.2 m, and ten times as many where none is left out."""
+SCOUTED = (30_000, 10_000, 20_000)
+"""Expansions of a search that leaves states out, at most, before it leaves out fewer: in blocks of 2, 4 and 8 cells a
+side. To turn round in a room takes up to 20,000 in blocks of 0.2 m, and ten times as many where none is left out."""
 PLAIN = 600_000
 """Expansions of the search that leaves nothing out after those that did, before it is asked whether there is any way:
 where robot and cart are hemmed in only few states are free, and that is soon over. They take half of what the answer
@@ -132,7 +132,7 @@ class _Search:
         rows, columns = lattice.cells // lattice.stride, lattice.stride
         blocks = ((rows >> thin) + 1) * ((columns >> thin) + 1) if thin else 0
         self._thin, self._marks = thin, np.zeros((blocks, self._bins), dtype=np.uint8)
-        more = SCOUTED if thin else PLAIN
+        more = SCOUTED[thin - 1] if thin else PLAIN
         self._most = min(self._settings.expansions, int(self._numbers[kernel.EXPANDED]) + more)
 
     @property
