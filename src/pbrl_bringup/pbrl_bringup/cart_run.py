@@ -19,7 +19,7 @@ from pbrl_control.cart import (
     DriveStatus,
 )
 from pbrl_control.planar import Array, compose, wrap
-from pbrl_planner.cart.leg import Drove, Leg, LegState, Order
+from pbrl_planner.cart.leg import ENDS, Leg, LegState, Order
 from pbrl_planner.cart.navigator import PATIENCE, Navigator
 from pbrl_planner.cart.outline import motions
 from pbrl_planner.cart.query import OUTCOMES, Outcome
@@ -37,11 +37,6 @@ LONGEST = 300.0
 """Simulated time after which a leg is given up [s]."""
 TRACED = 0.5
 """Between two points of the trace [s]."""
-ENDS = {
-    DriveStatus.ARRIVED: Drove.ARRIVED,
-    DriveStatus.REPLAN: Drove.REPLAN,
-    DriveStatus.FAILED: Drove.GRIP_LOST,
-}
 
 
 @dataclass
@@ -197,10 +192,13 @@ class CartRun:
     def _set_out(self, now: float) -> None:
         """Plan from here, and drive that."""
         here = self.senses.state(now)
-        made = None if here is None else self._asked(now, here)
-        order = self._leg.planned(now, *self._answer(made))
+        if here is None:
+            self._do(now, self._leg.planned(now, Outcome.NOT_READY, "it is not known where robot and cart are"))
+            return
+        made = self._asked(now, here)
+        order = self._leg.planned(now, *self._answer())
         if order is Order.FOLLOW:
-            assert made is not None and here is not None, "there is a path"
+            assert made is not None, "there is a path"
             self._drive(np.vstack([here, made.poses]), made)
         else:
             self._do(now, order)
@@ -214,7 +212,7 @@ class CartRun:
             return
         assert going is not None and going.plan is not None, "there is something ahead"
         driven, made = going.plan, self._asked(now, head[-1])
-        order = self._leg.planned(now, *self._answer(made))
+        order = self._leg.planned(now, *self._answer())
         if order is Order.SWITCH:
             assert made is not None, "there is a path"
             if not np.array_equal(made.primitives, driven.primitives[-len(made.primitives) :]):
@@ -232,10 +230,8 @@ class CartRun:
         self.last_plan = made if made is not None else self.last_plan
         return made
 
-    def _answer(self, made: LatticePlan | None) -> tuple[Outcome, str]:
-        call = self.navigator.calls[-1] if self.navigator.calls else None
-        if call is None:
-            return Outcome.NOT_READY, "it is not known where robot and cart are"
+    def _answer(self) -> tuple[Outcome, str]:
+        call = self.navigator.calls[-1]
         return OUTCOMES[call.answer], f"{call.answer} {call.reason}".strip()
 
     def _drive(self, poses: Array, plan: LatticePlan | None = None) -> None:

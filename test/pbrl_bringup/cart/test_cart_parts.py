@@ -289,6 +289,21 @@ def test_where_something_could_be_forgotten_it_asks_again_soon(monkeypatch: pyte
     assert run._going is not None and run.senses.recovered == 0
 
 
+def test_who_does_not_know_where_the_cart_is_asks_for_no_plan_and_goes_on_with_the_one_there_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    run = waiting_run([simple_plan()], monkeypatch)
+    run._tick(0.0)
+    going = run._going
+    monkeypatch.setattr(run.senses, "state", lambda now: None)
+    command = CartCommand(
+        np.zeros(3), 0.0, DriveStatus.BLOCKED, Cause.OBSTACLE, "somebody", np.zeros(4), np.zeros(4), 0.0, 0.0, None
+    )
+    for now in (1.0, 4.0, 5.0):
+        run._heed(now, going, command)
+    assert run._going is going and len(run.navigator.calls) == 1 and not run.ended
+
+
 def test_a_plan_that_somebody_stands_on_is_waited_on(monkeypatch: pytest.MonkeyPatch) -> None:
     made = simple_plan()
     run = waiting_run([made, None, None], monkeypatch)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+from pbrl_control.cart import DriveStatus
 from pbrl_planner.cart.query import Outcome
 from pbrl_planner.cart.settings import NavigationSettings
 
@@ -26,6 +27,14 @@ class Drove(StrEnum):
     GRIP_LOST = "the cart is not held as it should be"
     REFUSED = "no path that can be driven"
     STOPPED = "stopped"
+
+
+ENDS = {
+    DriveStatus.ARRIVED: Drove.ARRIVED,
+    DriveStatus.REPLAN: Drove.REPLAN,
+    DriveStatus.FAILED: Drove.GRIP_LOST,
+}
+"""What a drive ends with by the controller's status; with others it goes on."""
 
 
 class Order(StrEnum):

@@ -279,8 +279,9 @@ def go_with(
             stands = False
             for k in range(top, bottom):
                 for m in range(left, end):
-                    near = (k - i) ** 2 + (m - j) ** 2 <= radius * radius
-                    stands = stands or (near and floor[k, m] > 0)
+                    if floor[k, m] > 0 and (k - i) ** 2 + (m - j) ** 2 <= radius * radius:
+                        stands = True
+                        break
                 if stands:
                     break
             if stands:

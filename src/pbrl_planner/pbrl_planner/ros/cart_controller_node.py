@@ -35,7 +35,7 @@ from pbrl_control.planar import Array
 from pbrl_control.pr2_arms import Pr2Arms
 from pbrl_control.ros.conversions import arm_to_msg, seconds
 from pbrl_control.ros.qos import COMMANDS, LATCHED, NEWEST
-from pbrl_planner.cart.leg import Drove
+from pbrl_planner.cart.leg import ENDS, Drove
 from pbrl_planner.cart.tracker import CartTracker, grip_offset, up_to
 from pbrl_planner.costmap import CostField
 from pbrl_planner.errors import PlannerError
@@ -47,11 +47,6 @@ from pbrl_planner.ros.saying import Saying
 
 SIDES = ("left", "right")
 OUTCOMES = {each: getattr(FollowCartPath.Result, each.name) for each in Drove}
-ENDS = {
-    DriveStatus.ARRIVED: Drove.ARRIVED,
-    DriveStatus.REPLAN: Drove.REPLAN,
-    DriveStatus.FAILED: Drove.GRIP_LOST,
-}
 
 
 class CartControllerNode(Node):
