@@ -55,7 +55,7 @@ def measure(seed: int, quick: bool, out: Path, *, most: int | None = None, minut
     if not outcomes:
         raise BringupError("--minutes: expected time for one graph at least; give more")
     output().print(table("nodes struck", HEADS, cells(outcomes), right=(1, 2, 3, 4, 5, 6)))
-    write_text(out / "reliability.md", markdown(outcomes, seed))
+    write_text(out / "reliability.md", markdown(outcomes, seed, count))
     return Measured(rows_of(outcomes), {"cases": [asdict(each) for each in outcomes]})
 
 
@@ -118,10 +118,10 @@ def cells(outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
     return rows
 
 
-def markdown(outcomes: Sequence[Outcome], seed: int) -> str:
-    """Return the table of docs/reliability.md."""
+def markdown(outcomes: Sequence[Outcome], seed: int, count: int) -> str:
+    """Return the table of docs/reliability.md: what was done so far of `count` cases."""
     lines = [
-        f"`./pbrl bench kills --seed {seed} --most {len(outcomes)}`:",
+        f"`./pbrl bench kills --seed {seed} --most {count}`, {len(outcomes)} of its {count} cases:",
         "",
         f"| {' | '.join(HEADS)} |",
         f"|---{'|---:' * (len(HEADS) - 1)}|",
