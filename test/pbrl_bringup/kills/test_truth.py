@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pbrl_bringup.kills.striking import NEVER, _missing
+from pbrl_bringup.kills.striking import NEVER, _met, _missing
 from pbrl_bringup.kills.truth import ROW, moves, read_truth, time_to_rest
 
 DT = 0.01
@@ -61,3 +61,12 @@ def test_what_is_missing_is_the_longest_stretch_but_for_what_was_frozen() -> Non
     assert _missing(truth[truth < 12.0], heard, [(4.0, 5.5)]) < 0.05
     assert _missing(truth, heard[:0], []) == NEVER
     assert _missing(truth[:0], heard, []) == 0.0
+
+
+def test_who_has_just_started_has_to_be_found_first() -> None:
+    truth = np.arange(10.0, 20.0, 0.01)
+    before, after = np.arange(0.0, 9.0, 0.01), np.arange(12.6, 20.0, 0.01)
+    assert _met(truth, np.concatenate([before, after])) == pytest.approx(12.6)
+    assert _met(truth, before) == np.inf
+    assert _met(truth[:100], after) == np.inf, "what was heard later is of another one"
+    assert _met(truth[:0], after) == np.inf

@@ -81,7 +81,10 @@ def rows_of(outcomes: Sequence[Outcome]) -> list[Row]:
     rests = [each for each in struck if each.rest is not None]
     slow = [each for each in rests if (each.rest or 0.0) > REST]
     told = Counter(each.mission for each in struck)
-    lost = max((each.lost for each in struck if each.lost is not None), default=float("nan"))
+    lost, found = (
+        max((value for each in struck if (value := getattr(each, name)) is not None), default=float("nan"))
+        for name in ("lost", "found")
+    )
     states = Counter(each.state for each in struck)
     bad = {
         f"case {each.number}": f"{each.node} {each.way} in {each.state}: {each.sentence}"
@@ -100,7 +103,7 @@ def rows_of(outcomes: Sequence[Outcome]) -> list[Row]:
             slower=len(slow),
         ),
         at_least("missions resumed or reported", told[RESUMED] + told[REPORTED], "1", len(struck), **told, **bad),
-        at_most("longest stretch that a recording lost", lost, "s", LOST),
+        at_most("longest stretch that a recording lost", lost, "s", LOST, found=found),
     ]
 
 

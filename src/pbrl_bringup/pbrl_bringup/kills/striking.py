@@ -61,6 +61,8 @@ class Outcome:
         recovery: of the wall clock, until the mission was under way again [s].
         lost: of recordings of the same graph, longest stretch that is missing [s], `NEVER` where one cannot be read;
             None: there is none.
+        found: of the same recordings, longest time in which recorder and simulator, one of them just started, did not
+            know of each other [s]; None: there is none.
     """
 
     number: int
@@ -74,6 +76,7 @@ class Outcome:
     sentence: str
     recovery: float
     lost: float | None = None
+    found: float | None = None
 
 
 def live(folder: Path, cases: Sequence[Case], seed: int) -> list[Outcome]:
@@ -117,8 +120,8 @@ def _one_graph(folder: Path, cases: Sequence[Case], seed: int) -> list[Outcome]:
             except BringupError as error:
                 outcomes.append(_ended(case, life, str(error)))
                 break
-    lost = lost_of(life, frozen)
-    return [replace(each, lost=lost) for each in outcomes]
+    lost, found = lost_of(life, frozen)
+    return [replace(each, lost=lost, found=found) for each in outcomes]
 
 
 def _ended(case: Case, life: Life, sentence: str) -> Outcome:
@@ -201,26 +204,32 @@ def _goes_on(life: Life, case: Case, state: State | None, told: int) -> tuple[st
     return RESUMED, f"{last[1]}: {last[2]}"
 
 
-def lost_of(life: Life, frozen: Sequence[tuple[float, float]]) -> float:
-    """Return the longest stretch of which no recording of a graph has anything though its simulator ran [s].
+def lost_of(life: Life, frozen: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Return the longest stretch that a recording of a graph lacks though its simulator ran, and `Outcome.found` [s].
 
     Args:
         life: the graph, ended.
         frozen: from when to when a recorder or simulator was frozen or away [s of the wall clock].
     """
     walls = [read_truth(path)[:, WALL] for path, _ in life.truths]
-    worst = 0.0
+    lost, found = 0.0, 0.0
     for bag, begun, ended in life.bags:
         try:
             heard = _times(bag)
         except BagError:
-            return NEVER
+            return NEVER, NEVER
         for truth in walls:
-            # A simulator that was started anew has to be found first: from then on it counts.
-            met = heard[np.searchsorted(heard, truth[0]) :] if len(truth) else heard[:0]
-            begin = max(begun, met[0]) if len(met) else begun
-            worst = max(worst, _missing(truth[(truth > begin) & (truth < ended)], heard, frozen))
-    return worst
+            both = truth[(truth > begun) & (truth < ended)]
+            met = _met(both, heard)
+            found = max(found, met - both[0]) if len(both) and math.isfinite(met) else found
+            lost = max(lost, _missing(both[both >= met] if math.isfinite(met) else both, heard, frozen))
+    return lost, found
+
+
+def _met(truth: Array, heard: Array) -> float:
+    """Return when a recording first heard of a simulator that ran at some times; infinite where it never did."""
+    after = np.searchsorted(heard, truth[0]) if len(truth) else len(heard)
+    return float(heard[after]) if after < len(heard) and heard[after] <= truth[-1] else math.inf
 
 
 def _times(bag: Path) -> Array:
