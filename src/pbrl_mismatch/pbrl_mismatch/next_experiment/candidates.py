@@ -44,7 +44,7 @@ class Reach:
     directions: int = 8
     speeds: tuple[float, ...] = (0.05, 0.12)
     durations: tuple[float, ...] = (2.0, 4.0)
-    most: int = 64
+    most: int = 256
     gripped: bool = True
     friction: float = 0.4
     most_force: float = 80.0
