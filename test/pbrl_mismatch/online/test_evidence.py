@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pbrl_mismatch.online.evidence import Noise, Window, adjusted, log_e_value
+from pbrl_mismatch.online.evidence import Noise, Window, adjusted, log_e_value, no_sharper
 from pbrl_mismatch.online.options import MonitorOptions
 from pbrl_mismatch.online.watch import grown
 
@@ -73,6 +73,18 @@ def test_adjusting_window_by_window_is_least_squares_over_all() -> None:
     precision = np.linalg.inv(prior) + rows.T @ rows
     np.testing.assert_allclose(mean, np.linalg.solve(precision, rows.T @ np.concatenate(data)), atol=1e-10)
     np.testing.assert_allclose(covariance, np.linalg.inv(precision), atol=1e-10)
+
+
+def test_however_much_is_heard_something_of_the_first_spread_is_kept() -> None:
+    rng = np.random.default_rng(5)
+    root, turn = rng.normal(size=(4, 4)), np.linalg.qr(rng.normal(size=(4, 4)))[0]
+    first, shares = root @ root.T, np.array([0.01, 0.1, 0.5, 1.0])
+    basis = root @ turn
+    kept = no_sharper((basis * shares**2) @ basis.T, first, 0.3)
+    np.testing.assert_allclose(kept, (basis * np.maximum(shares, 0.3) ** 2) @ basis.T, atol=1e-9)
+    change = rng.normal(size=(4, 4))  # other coordinates say the same
+    other = no_sharper(change @ (basis * shares**2) @ basis.T @ change.T, change @ first @ change.T, 0.3)
+    np.testing.assert_allclose(other, change @ kept @ change.T, atol=1e-8)
 
 
 def test_the_sum_over_beginnings_keeps_its_promise() -> None:

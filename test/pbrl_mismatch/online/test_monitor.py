@@ -84,6 +84,15 @@ def test_a_model_that_is_wrong_is_a_mismatch_and_one_that_is_unsure_is_not(clean
     assert wrong and not unsure
 
 
+def test_before_an_alarm_rare_draws_have_their_say(clean: Recording) -> None:
+    far = table(mass=30.0)
+    draws = far.draws.copy()
+    draws[0, ::199, 0] = 20.0  # too few for a reading of their own, too far off for the Gaussian of all
+    assert not watched(clean, replace(far, draws=draws), until=8.0)[0]
+    draws[0, ::199, 0] = 40.0
+    assert watched(clean, replace(far, draws=draws), until=8.0)[0]
+
+
 def test_before_an_alarm_the_newest_model_has_its_say(clean: Recording) -> None:
     monitor = MismatchMonitor()
     monitor.give({"table": table(mass=30.0)})

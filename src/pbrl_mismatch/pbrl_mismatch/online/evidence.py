@@ -139,3 +139,18 @@ def adjusted(window: Window, coordinates: Array, covariance: Array) -> tuple[Arr
     """Return coordinates (K,) and covariance (K, K) after a window that the model has foretold (Kalman's update)."""
     gain = covariance @ window.slope.T
     return coordinates + gain @ window.residual, covariance - gain @ gain.T
+
+
+def no_sharper(covariance: Array, first: Array, share: float) -> Array:
+    """Return a covariance (K, K) that in no direction has less than a share of another one's standard deviation.
+
+    Args:
+        covariance: (K, K).
+        first: (K, K) the other one, positive definite.
+        share: of its standard deviation.
+    """
+    lower = np.linalg.cholesky(first)
+    whitened = np.linalg.solve(lower, np.linalg.solve(lower, covariance).T)
+    values, vectors = np.linalg.eigh(0.5 * (whitened + whitened.T))
+    root = lower @ (vectors * np.sqrt(np.maximum(values, share**2)))
+    return root @ root.T

@@ -2,8 +2,8 @@
 
 A window is tested against the model that was there before it. A model that is published while everything is foretold
 takes the place of the one before if it says something else; while a mismatch is showing, the model stays, for a
-learner is already learning from what the mismatch does. Before an alarm the newest model has its say: if it foretells
-the last windows, what was wrong was the model before, and it is replaced.
+learner is already learning from what the mismatch does. Before an alarm the newest model has its say, and draws of the
+one in use: if one of them foretells the last windows, it is used from then on (`second_look`).
 """
 
 from __future__ import annotations
@@ -18,15 +18,19 @@ import numpy as np
 from pbrl_bag.types import Recording
 from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.errors import MismatchError
+from pbrl_mismatch.online.evidence import Noise
 from pbrl_mismatch.online.options import MonitorOptions
 from pbrl_mismatch.online.reading import Reading, readings_of
+from pbrl_mismatch.online.second_look import Looked, as_adjusted, nearest_draws, replayed, run
 from pbrl_mismatch.online.watch import CALM, ReadingTest
 from pbrl_mismatch.online.windows import Grid, Look, cut_look, looks_due
 from pbrl_model.errors import ModelError
 from pbrl_model.posterior import Posterior
 
-MEMORY = 8
-"""Looks that a newer model is asked about before an alarm."""
+MEMORY = 12
+"""Looks that others are asked about before an alarm."""
+HISTORY = 60
+"""Windows that draws are held against before they are asked, laid end to end."""
 ELSEWHERE = 3.0
 """A model whose mean is further than this many standard deviations from what is used says something else."""
 SHARPER = 0.5
@@ -81,7 +85,8 @@ class ObjectWatch:
         self._newest: Posterior | None = None
         self._used: Posterior | None = None
         self._tests: list[ReadingTest] = []
-        self._recent: deque[tuple[float, dict[Grid, Cuts]]] = deque(maxlen=MEMORY)
+        self._recent: deque[tuple[Looked, Noise]] = deque(maxlen=MEMORY)
+        self._history: deque[Cuts] = deque(maxlen=HISTORY)
         self._quiet_until = -math.inf
 
     @property
@@ -104,6 +109,7 @@ class ObjectWatch:
         """Expect times of another clock."""
         self.looked, self._quiet_until = -math.inf, -math.inf
         self._recent.clear()
+        self._history.clear()
         for test in self._tests:
             test.forget()
 
@@ -125,11 +131,12 @@ class ObjectWatch:
         return alarm
 
     def _test(self, look: Look, cuts: dict[Grid, Cuts]) -> Alarm | None:
-        self._recent.append((look.end, cuts))
-        counts = look.end > self._quiet_until
-        _run(self._tests, look.end, cuts, counts=counts)
+        looked = look.end, cuts
+        self._recent.append((looked, self._tests[0].noise))
+        self._history.extend(window for grid, window in cuts.items() if grid == (max(self.options.windows), 0))
+        run(self._tests, looked, counts=look.end > self._quiet_until)
         self.tested += len(cuts)
-        if self.evidence < self.options.threshold or self._foretold_by_newest():
+        if self.evidence < self.options.threshold or self._foretold_otherwise():
             return None
         best = min(self._tests, key=lambda test: test.highest)
         alarm = Alarm(
@@ -169,17 +176,26 @@ class ObjectWatch:
             _apart(test, reading) for test, reading in zip(self._tests, fresh, strict=True)
         )
 
-    def _foretold_by_newest(self) -> bool:
-        """Tell whether the newest model, if it is another, foretells the last looks; it is then used."""
-        if self._newest is None or self._newest is self._used:
-            return False
-        tests = [ReadingTest(each, self.options, self._tests[0].noise) for each in readings_of(self._newest)]
-        for end, cuts in self._recent:
-            _run(tests, end, cuts, counts=True)
-        if min(test.highest for test in tests) >= self.options.threshold:
-            return False
-        self._use(self._newest)
-        return True
+    def _foretold_otherwise(self) -> bool:
+        """Tell whether another model, or a draw of the one in use, foretells the last looks; it is then used."""
+        looks, noise = [looked for looked, _ in self._recent], self._recent[0][1]
+
+        def foretelling(readings: list[Reading]) -> list[ReadingTest]:
+            tests = replayed(readings, looks, noise, self.options)
+            return [test for test in tests if test.highest < self.options.threshold]
+
+        if foretelling([as_adjusted(test) for test in self._tests]):
+            return False  # what speaks against it goes further back than what is remembered
+        if self._newest is not None and self._newest is not self._used and foretelling(list(readings_of(self._newest))):
+            self._use(self._newest)
+            return True
+        longest = max(self.options.windows)
+        last = [window for _, cuts in looks for (length, _), window in cuts.items() if length == longest]
+        heard = [*self._history, *last]
+        found = foretelling([near for test in self._tests for near in nearest_draws(test.reading, heard, self.options)])
+        if found:
+            self._tests = sorted(found, key=lambda test: test.highest)[: len(self._tests)]
+        return bool(found)
 
 
 class MismatchMonitor:
@@ -230,14 +246,6 @@ class MismatchMonitor:
 
 SLACK = 4.0
 """Kept beyond that [s]: the smoother's margin, and a stream that is late."""
-
-
-def _run(tests: list[ReadingTest], end: float, cuts: dict[Grid, Cuts], *, counts: bool) -> None:
-    """Let every reading take in what ends at a moment, and learn from what lies back."""
-    for test in tests:
-        for grid, window in cuts.items():
-            test.take(grid, window, end, counts=counts)
-        test.settle(end)
 
 
 def _apart(test: ReadingTest, reading: Reading) -> bool:

@@ -46,7 +46,7 @@ class MonitorOptions(BaseModel):
     context: Annotated[float, Field(ge=0.0, le=20.0)] = 2.0
     forces: tuple[Positive, ...] = (1.0, 3.0, 10.0, 30.0)
     sensor_floor: Positive = 0.15
-    sensor_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
+    sensor_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
     closing: Annotated[float, Field(ge=0.0, le=5.0)] = 0.5
     rest: Positive = 30.0
     keep: Annotated[float, Field(ge=5.0, le=600.0)] = 60.0

@@ -59,11 +59,13 @@ class Reading:
         hypothesis: free columns and what is fixed; its priors are not correlated.
         mean: (K,) coordinates.
         covariance: (K, K).
+        draws: (n, K) those that are read so.
     """
 
     hypothesis: Hypothesis
     mean: Array
     covariance: Array
+    draws: Array
 
 
 def readings_of(posterior: Posterior) -> tuple[Reading, ...]:
@@ -74,10 +76,9 @@ def readings_of(posterior: Posterior) -> tuple[Reading, ...]:
     slippery = "mu_x" in canonical.names and "wheel_x" in canonical.names
     out = []
     for group in _groups(values):
-        mean = values[group].mean(axis=0)
         covariance = np.cov(values[group].T, ddof=0).reshape(len(floor), len(floor)) + np.diag(floor**2)
         covariance = _bounded(covariance, canonical.names)
-        out += [_reading(canonical, mean, covariance, cone) for cone in ((0.0, 1.0) if slippery else (0.0,))]
+        out += [_reading(canonical, values[group], covariance, cone) for cone in ((0.0, 1.0) if slippery else (0.0,))]
     return tuple(out)
 
 
@@ -121,7 +122,8 @@ def _bounded(covariance: Array, names: tuple[str, ...]) -> Array:
     return covariance * np.outer(factor, factor)
 
 
-def _reading(posterior: Posterior, mean: Array, covariance: Array, cone: float) -> Reading:
+def _reading(posterior: Posterior, values: Array, covariance: Array, cone: float) -> Reading:
+    mean = values.mean(axis=0)
     base = neutral_row()
     base[: posterior.rows().shape[1]] = posterior.rows()[0]
     base[COLUMN["cone"]] = cone
@@ -138,4 +140,5 @@ def _reading(posterior: Posterior, mean: Array, covariance: Array, cone: float) 
     whole = np.zeros((size, size))
     whole[:known, :known] = covariance
     whole[range(known, size), range(known, size)] = [each.spread**2 for each in extra]
-    return Reading(hypothesis, hypothesis.mean, whole)
+    draws = np.concatenate([values, np.tile(hypothesis.mean[known:], (len(values), 1))], axis=1)
+    return Reading(hypothesis, hypothesis.mean, whole, draws)

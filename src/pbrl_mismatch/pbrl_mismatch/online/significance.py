@@ -6,11 +6,14 @@ what is believed beforehand, and it may be asked of any recording.
 
 from __future__ import annotations
 
+import numpy as np
+
 from pbrl_bag.types import Recording
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.track import lay_track
 from pbrl_mismatch.online.options import MonitorOptions
 from pbrl_mismatch.online.reading import readings_of
+from pbrl_mismatch.online.second_look import nearest_draws
 from pbrl_mismatch.online.slices import between
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.objective import Objective
@@ -31,6 +34,8 @@ def promised_level(options: MonitorOptions) -> float:
 def batch_p_value(recording: Recording, posterior: Posterior, until: float, options: MonitorOptions) -> float:
     """Return the p-value of the batch test on what was heard by a moment: that of the reading that does best.
 
+    Each is climbed from its mean and, as in a second look, from the draws that come nearest to what was heard.
+
     Args:
         recording: from its beginning on.
         posterior: of one object.
@@ -48,8 +53,8 @@ def batch_p_value(recording: Recording, posterior: Posterior, until: float, opti
     cuts = cut_windows(track, WINDOW)
     found = []
     for reading in readings_of(posterior):
-        peak = climb(
-            Objective(reading.hypothesis, cuts, options.sensor_floor), reading.mean[None], iterations=ITERATIONS
-        )
-        found.append(predictive_test(peak, 0).p_value)
+        starts = [reading.mean, *(near.mean for near in nearest_draws(reading, (cuts,), options))]
+        objective = Objective(reading.hypothesis, cuts, options.sensor_floor)
+        peak = climb(objective, np.array(starts), iterations=ITERATIONS)
+        found += [predictive_test(peak, row).p_value for row in range(len(starts))]
     return max(found)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pbrl_mismatch.data.cuts import Cuts
-from pbrl_mismatch.online.evidence import Noise, Window, adjusted, log_e_value, look
+from pbrl_mismatch.online.evidence import Noise, Window, adjusted, log_e_value, look, no_sharper
 from pbrl_mismatch.online.options import MonitorOptions
 from pbrl_mismatch.online.reading import Reading
 from pbrl_mismatch.online.windows import Grid
@@ -22,6 +22,8 @@ from pbrl_mismatch.search.objective import Objective
 
 CALM = float(np.log(3.0))
 """A statistic below this (logarithm) is nothing to think of: the windows behind it have been foretold."""
+KEPT = 0.3
+"""Share of a reading's first standard deviation that is kept, however much is heard."""
 
 
 def grown(statistic: float, value: float) -> float:
@@ -92,12 +94,17 @@ class ReadingTest:
         return value
 
     def settle(self, now: float) -> None:
-        """Learn from the windows that lie so far back that no window to come overlaps them."""
+        """Learn from the windows that lie so far back that no window to come overlaps them.
+
+        Slopes are taken where the windows before have led to, so that hundreds of windows together say what none of
+        them does (where along its axle a wheel is that rolls freely): what was not known stays a little so.
+        """
         if self.highest > CALM:
             return
         while self._waiting and self._waiting[0][0] <= now - max(self.options.windows) + 1e-6:
             window = self.seen(self._waiting.popleft()[1])
-            self.coordinates, self.covariance = adjusted(window, self.coordinates, self.covariance)
+            self.coordinates, covariance = adjusted(window, self.coordinates, self.covariance)
+            self.covariance = no_sharper(covariance, self.reading.covariance, KEPT)
 
     def forget(self) -> None:
         """Begin the statistics anew."""
