@@ -27,6 +27,8 @@ ROUNDS = 3
 """Linearisations in the nuisances: the start is far enough from its guess to stick or slip."""
 FIRST_FREEDOM, MOST_FREEDOM = 20.0, 400.0
 """Numbers that the scale of the noise is worth before the first window, and at most."""
+KEPT = 0.3
+"""Share of a reading's first standard deviation that is kept, however much is heard."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,22 @@ def look(objective: Objective, coordinates: Array, covariance: Array) -> Window:
         coordinates: (K,) where the parameters are thought to be.
         covariance: (K, K) how well.
     """
+    centred, spread, slope, z = linearised(objective, coordinates)
+    noise = np.eye(len(centred)) + spread @ spread.T
+    lower = np.linalg.cholesky(noise + slope @ covariance @ slope.T)
+    push = _pushes(objective, coordinates[None], z).T
+    left, strength, _ = np.linalg.svd(np.linalg.solve(lower, push), full_matrices=False)
+    residual = np.linalg.solve(lower, centred)
+    return Window(residual, np.linalg.solve(lower, slope), strength, left.T @ residual)
+
+
+def linearised(objective: Objective, coordinates: Array) -> tuple[Array, Array, Array, Array]:
+    """Linearise the single window of an objective.
+
+    Returns:
+        Residual (n,) with no nuisances, slopes in nuisances (n, NUISANCES) and parameters (n, K) of what was seen, and
+        the nuisances (1, 1, NUISANCES) at which that was done.
+    """
     u = coordinates[None]
     z = objective.at_rest(1)
     linear = objective.linearise(u, z)
@@ -91,19 +109,17 @@ def look(objective: Objective, coordinates: Array, covariance: Array) -> Window:
         spread, residual = linear.spread[0, 0], linear.residual[0, 0]
         z = z + np.linalg.solve(spread.T @ spread + np.eye(NUISANCES), spread.T @ residual - z[0, 0])
         linear = objective.linearise(u, z)
-    seen = objective.cuts.weight[0].reshape(-1) > 0.0
-    spread, slope = linear.spread[0, 0][seen], linear.slope[0, 0][seen]
-    centred = linear.residual[0, 0][seen] + spread @ z[0, 0]
-    noise = np.eye(len(centred)) + spread @ spread.T
-    lower = np.linalg.cholesky(noise + slope @ covariance @ slope.T)
-    push = _pushes(objective, u, z)[:, seen].T
-    left, strength, _ = np.linalg.svd(np.linalg.solve(lower, push), full_matrices=False)
-    residual = np.linalg.solve(lower, centred)
-    return Window(residual, np.linalg.solve(lower, slope), strength, left.T @ residual)
+    seen = _seen(objective)
+    spread = linear.spread[0, 0][seen]
+    return linear.residual[0, 0][seen] + spread @ z[0, 0], spread, linear.slope[0, 0][seen], z
+
+
+def _seen(objective: Objective) -> NDArray[np.bool_]:
+    return np.asarray(objective.cuts.weight[0].reshape(-1) > 0.0)
 
 
 def _pushes(objective: Objective, u: Array, z: Array) -> Array:
-    """Return (3 KNOTS, R) how the poses over noise follow each knot of a wrench, for a newton."""
+    """Return (3 KNOTS, n) how the poses over noise follow each knot of a wrench, for a newton."""
     cuts, gyration = objective.cuts, objective.cuts.track.gyration
     unit = np.array([1.0, 1.0, gyration])
     told = cuts.told + np.einsum("wkl,wl->wk", cuts.root, z[0, :, :6])
@@ -113,7 +129,8 @@ def _pushes(objective: Objective, u: Array, z: Array) -> Array:
         extra[1 + k, :, k // 3, k % 3] += TEST_STEP * unit[k % 3]
     rows = np.repeat(objective.hypothesis.rows(u), count, 0)
     found = poses(rows, cuts, np.repeat(told[None], count, 0), extra)
-    return ((found[1:] - found[:1]) * cuts.weight / TEST_STEP).reshape(3 * KNOTS, -1)
+    moved = ((found[1:] - found[:1]) * cuts.weight / TEST_STEP).reshape(3 * KNOTS, -1)
+    return np.asarray(moved[:, _seen(objective)])
 
 
 def log_e_value(window: Window, noise: Noise, forces: tuple[float, ...]) -> float:
@@ -139,6 +156,16 @@ def adjusted(window: Window, coordinates: Array, covariance: Array) -> tuple[Arr
     """Return coordinates (K,) and covariance (K, K) after a window that the model has foretold (Kalman's update)."""
     gain = covariance @ window.slope.T
     return coordinates + gain @ window.residual, covariance - gain @ gain.T
+
+
+def grown(statistic: float, value: float) -> float:
+    """Return the logarithm of R after a window, R <- (1 + R) e.
+
+    Args:
+        statistic: logarithm of R before.
+        value: logarithm of the window's e-value.
+    """
+    return float(np.logaddexp(0.0, statistic)) + value
 
 
 def no_sharper(covariance: Array, first: Array, share: float) -> Array:

@@ -21,8 +21,8 @@ from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.online.evidence import Noise
 from pbrl_mismatch.online.options import MonitorOptions
 from pbrl_mismatch.online.reading import Reading, readings_of
-from pbrl_mismatch.online.second_look import Looked, as_adjusted, nearest_draws, replayed, run
-from pbrl_mismatch.online.watch import CALM, ReadingTest
+from pbrl_mismatch.online.second_look import WORTH, Looked, as_adjusted, nearest_draws, replayed, run
+from pbrl_mismatch.online.watch import ReadingTest
 from pbrl_mismatch.online.windows import Grid, Look, cut_look, looks_due
 from pbrl_model.errors import ModelError
 from pbrl_model.posterior import Posterior
@@ -155,7 +155,7 @@ class ObjectWatch:
         """Take the newest model where that is due."""
         if self._newest is None or self._newest is self._used:
             return
-        if self._tests and (self.evidence > CALM or not self._differs(self._newest)):
+        if self._tests and (not any(test.calm for test in self._tests) or not self._differs(self._newest)):
             return
         self._use(self._newest)
 
@@ -179,22 +179,25 @@ class ObjectWatch:
     def _foretold_otherwise(self) -> bool:
         """Tell whether another model, or a draw of the one in use, foretells the last looks; it is then used."""
         looks, noise = [looked for looked, _ in self._recent], self._recent[0][1]
+        threshold = self.options.threshold
 
-        def foretelling(readings: list[Reading]) -> list[ReadingTest]:
+        def tested(readings: list[Reading]) -> list[ReadingTest]:
             tests = replayed(readings, looks, noise, self.options)
-            return [test for test in tests if test.highest < self.options.threshold]
+            return sorted(tests, key=lambda test: test.highest)
 
-        if foretelling([as_adjusted(test) for test in self._tests]):
+        if tested([as_adjusted(test) for test in self._tests])[0].highest < threshold:
             return False  # what speaks against it goes further back than what is remembered
-        if self._newest is not None and self._newest is not self._used and foretelling(list(readings_of(self._newest))):
-            self._use(self._newest)
+        newest = self._newest if self._newest is not self._used else None
+        if newest is not None and tested(list(readings_of(newest)))[0].highest < threshold:
+            self._use(newest)
             return True
         longest = max(self.options.windows)
         last = [window for _, cuts in looks for (length, _), window in cuts.items() if length == longest]
         heard = [*self._history, *last]
-        found = foretelling([near for test in self._tests for near in nearest_draws(test.reading, heard, self.options)])
+        draws = tested([near for test in self._tests for near in nearest_draws(test.reading, heard, self.options)])
+        found = [test for test in draws if test.highest < threshold - WORTH]
         if found:
-            self._tests = sorted(found, key=lambda test: test.highest)[: len(self._tests)]
+            self._tests = found[: len(self._tests)]
         return bool(found)
 
 

@@ -80,6 +80,7 @@ class MonitorOptions(BaseModel):
 
         The statistic R of a grid is a Shiryaev-Roberts sum of e-values: R minus the number of windows is a martingale
         under the model, so by Doob's inequality R reaches c within n windows with a chance of at most n / c. The
-        grids share the promised chance evenly.
+        grids, and the sum for what lasts (`lasting`), share the promised chance evenly.
         """
-        return float(np.log(sum(self.horizon / length for length, _ in self.grids) / self.false_alarm))
+        windows = sum(self.horizon / length for length, _ in self.grids) + self.horizon / max(self.windows)
+        return float(np.log(windows / self.false_alarm))

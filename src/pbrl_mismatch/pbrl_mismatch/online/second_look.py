@@ -8,6 +8,7 @@ was heard. A model has failed only if none of them foretells it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -25,6 +26,8 @@ Looked = tuple[float, dict[Grid, Cuts]]
 """When a look was [s], and its windows."""
 RANKED, ASKED = 200, 2
 """Draws of each reading that are simulated over what was heard, and of those the nearest, which are tested on it."""
+WORTH = math.log(RANKED)
+"""By which a draw must do better than an alarm asks for: it is one of so many [nat]."""
 
 
 def run(tests: Iterable[ReadingTest], looked: Looked, *, counts: bool) -> None:

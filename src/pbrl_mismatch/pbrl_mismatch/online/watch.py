@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pbrl_mismatch.data.cuts import Cuts
-from pbrl_mismatch.online.evidence import Noise, Window, adjusted, log_e_value, look, no_sharper
+from pbrl_mismatch.online.evidence import KEPT, Noise, Window, adjusted, grown, log_e_value, look, no_sharper
+from pbrl_mismatch.online.lasting import Lasting
 from pbrl_mismatch.online.options import MonitorOptions
 from pbrl_mismatch.online.reading import Reading
 from pbrl_mismatch.online.windows import Grid
@@ -22,18 +23,6 @@ from pbrl_mismatch.search.objective import Objective
 
 CALM = float(np.log(3.0))
 """A statistic below this (logarithm) is nothing to think of: the windows behind it have been foretold."""
-KEPT = 0.3
-"""Share of a reading's first standard deviation that is kept, however much is heard."""
-
-
-def grown(statistic: float, value: float) -> float:
-    """Return the logarithm of R after a window, R <- (1 + R) e.
-
-    Args:
-        statistic: logarithm of R before.
-        value: logarithm of the window's e-value.
-    """
-    return float(np.logaddexp(0.0, statistic)) + value
 
 
 @dataclass
@@ -56,19 +45,28 @@ class ReadingTest:
 
     def __post_init__(self) -> None:
         self.coordinates, self.covariance = self.reading.mean.copy(), self.reading.covariance.copy()
+        self.lasting = Lasting(self.reading)
         self._waiting: deque[tuple[float, Cuts]] = deque()
 
     @property
     def highest(self) -> float:
         """Return the logarithm of the largest statistic."""
-        return max(self.statistic.values(), default=-np.inf)
+        return max((*self.statistic.values(), self.lasting.highest))
+
+    @property
+    def calm(self) -> bool:
+        """Tell whether the last windows, each for itself, have been foretold."""
+        return max(self.statistic.values(), default=-np.inf) <= CALM
+
+    def floor(self, cuts: Cuts) -> float:
+        """Return the size of the sensor's own error in a window [N]."""
+        first, steps = int(cuts.span[0, 0]), int(cuts.span[0, 1])
+        force = float(np.sqrt(np.mean(np.sum(cuts.track.felt[first : first + steps, :2] ** 2, axis=1))))
+        return float(np.hypot(self.options.sensor_floor, self.options.sensor_share * force))
 
     def seen(self, cuts: Cuts) -> Window:
         """Return a window as this reading sees it."""
-        first, steps = int(cuts.span[0, 0]), int(cuts.span[0, 1])
-        force = float(np.sqrt(np.mean(np.sum(cuts.track.felt[first : first + steps, :2] ** 2, axis=1))))
-        floor = float(np.hypot(self.options.sensor_floor, self.options.sensor_share * force))
-        objective = Objective(self.reading.hypothesis, cuts, floor)
+        objective = Objective(self.reading.hypothesis, cuts, self.floor(cuts))
         return look(objective, self.coordinates, self.covariance)
 
     def take(self, grid: Grid, cuts: Cuts, end: float, *, counts: bool) -> float:
@@ -90,6 +88,7 @@ class ReadingTest:
             self.statistic[grid] = grown(self.statistic.get(grid, -np.inf), value)
         if grid == (max(self.options.windows), 0):
             self._waiting.append((end, cuts))
+            self.lasting.take(cuts, self.floor(cuts), self.noise, counts=counts)
             self.noise = self.noise.with_window(window)
         return value
 
@@ -99,7 +98,7 @@ class ReadingTest:
         Slopes are taken where the windows before have led to, so that hundreds of windows together say what none of
         them does (where along its axle a wheel is that rolls freely): what was not known stays a little so.
         """
-        if self.highest > CALM:
+        if not self.calm:
             return
         while self._waiting and self._waiting[0][0] <= now - max(self.options.windows) + 1e-6:
             window = self.seen(self._waiting.popleft()[1])
@@ -109,4 +108,5 @@ class ReadingTest:
     def forget(self) -> None:
         """Begin the statistics anew."""
         self.statistic.clear()
+        self.lasting = Lasting(self.reading)
         self._waiting.clear()
