@@ -39,16 +39,16 @@ def measure(seed: int, quick: bool, out: Path, *, most: int | None = None, minut
     done = [each for each in found if each is not None]
     if not done:
         raise BringupError("--minutes: expected time for one mission at least; give more")
-    return Measured(rows_of(done), {"missions": [asdict(each) for each in done]})
+    return Measured(rows_of(done, count), {"missions": [asdict(each) for each in done]})
 
 
-def rows_of(done: Sequence[Mission]) -> list[Row]:
-    """Return the rows of acceptance."""
+def rows_of(done: Sequence[Mission], count: int) -> list[Row]:
+    """Return the rows of acceptance for missions, of which there are to be so many."""
     nearest = {each.kind: min(other.nearest for other in done if other.kind == each.kind) for each in done}
     crossed = [each for each in done if not each.nearest > 0.0]
     held_back, held = sum(each.fenced for each in done), sum(each.held for each in done)
     return [
-        at_least("missions", len(done), "1", min(len(done), MISSIONS), held_back=held_back, with_a_load=held),
+        at_least("missions", len(done), "1", count, held_back=held_back, with_a_load=held),
         at_most("missions in which the fence was crossed", len(crossed), "1", 0),
         *(at_least(f"nearest to the fence, {kind}", nearest[kind], "m", LEAST) for kind in LONGEST if kind in nearest),
     ]

@@ -56,7 +56,7 @@ def measure(seed: int, quick: bool, out: Path, *, most: int | None = None, minut
         raise BringupError("--minutes: expected time for one graph at least; give more")
     output().print(table("nodes struck", HEADS, cells(outcomes), right=(1, 2, 3, 4, 5, 6)))
     write_text(out / "reliability.md", markdown(outcomes, seed, count))
-    return Measured(rows_of(outcomes), {"cases": [asdict(each) for each in outcomes]})
+    return Measured(rows_of(outcomes, count), {"cases": [asdict(each) for each in outcomes]})
 
 
 def _lived(out: Path, life: Sequence[Case], seed: int, count: int, *, begin: bool) -> tuple[Outcome, ...]:
@@ -75,8 +75,8 @@ def _lived(out: Path, life: Sequence[Case], seed: int, count: int, *, begin: boo
     return () if kept is None else kept.outcomes
 
 
-def rows_of(outcomes: Sequence[Outcome]) -> list[Row]:
-    """Return the rows of acceptance."""
+def rows_of(outcomes: Sequence[Outcome], count: int) -> list[Row]:
+    """Return the rows of acceptance for cases, of which there are to be so many."""
     struck = [each for each in outcomes if each.mission != NOT_MET]
     rests = [each for each in struck if each.rest is not None]
     slow = [each for each in rests if (each.rest or 0.0) > REST]
@@ -92,8 +92,8 @@ def rows_of(outcomes: Sequence[Outcome]) -> list[Row]:
         if each.mission not in (RESUMED, REPORTED)
     }
     return [
-        at_least("nodes killed or frozen", len(struck), "1", len(outcomes), not_met=len(outcomes) - len(struck)),
-        at_least("states in which that was", len(states), "1", min(len(STATES), len(outcomes)), **states),
+        at_least("nodes killed or frozen", len(struck), "1", count, not_met=len(outcomes) - len(struck)),
+        at_least("states in which that was", len(states), "1", min(len(STATES), count), **states),
         at_most(
             "longest until the robot rests, of those in which it moved",
             max((each.rest or 0.0 for each in rests), default=float("nan")),
