@@ -16,11 +16,11 @@ from pbrl_mismatch.search.weigh import weigh
 OPTIONS = DiagnoseOptions()
 
 
-def fitted(variant: str, evidence: float) -> Any:
+def fitted(variant: str, evidence: float, scale: float = 1.0) -> Any:
     """Return what is weighed of a hypothesis, by its variant: its kind of baseline, then effects by number."""
     effects = tuple(part.split("/")[0] for part in variant.split(" + ")[1:])
     return SimpleNamespace(
-        hypothesis=SimpleNamespace(effects=effects, variant=variant), evidence=evidence, noise_scale=1.0
+        hypothesis=SimpleNamespace(effects=effects, variant=variant), evidence=evidence, noise_scale=scale
     )
 
 
@@ -50,6 +50,32 @@ def test_two_effects_are_the_same_two_in_either_order() -> None:
     ways = ["free + tether/0 + detent/1", "free + detent/1 + tether/0"]
     once, twice = (weights(*(fitted(way, -50.0) for way in ways[:count])) for count in (1, 2))
     assert once["detent", "tether"] == pytest.approx(twice["detent", "tether"])
+
+
+def test_sets_that_differ_by_a_hundredth_of_the_noise_are_not_worlds_apart() -> None:
+    one, other = "free + tether/0 + floor_slope/0", "free + tether/0 + viscous_drag/0"
+    single = fitted("free + tether/0", 900.0)
+    found = weights(single, fitted(one, 1000.0, 1.014), fitted(other, 998.0, 1.016))
+    assert found["floor_slope", "tether"] - found["tether", "viscous_drag"] == pytest.approx(
+        2.0 + math.log(len(EFFECTS["viscous_drag"].variants))
+    )
+    # Where even the likeliest falls short, one effect is enough.
+    short = weights(single, fitted(one, 1000.0, 1.2), fitted(other, 900.0, 1.014))
+    assert short["tether",] > short["floor_slope", "tether"] > short["tether", "viscous_drag"]
+
+
+def test_a_law_is_not_named_for_a_little_more_than_its_limit_explains() -> None:
+    def gained(more: float) -> float:
+        found = weights(
+            fitted("free + ground_friction/0", 1400.0), fitted("free + breakaway_friction/0", 1400.0 + more)
+        )
+        return found["breakaway_friction",] - found["ground_friction",]
+
+    assert gained(8.0) == pytest.approx(8.0 - 15.0) and gained(40.0) == pytest.approx(40.0 - 15.0)
+    alone = weights(fitted("free + breakaway_friction/0", 1400.0))
+    assert alone["breakaway_friction",] == pytest.approx(
+        weights(fitted("free + floor_slope/0", 1400.0))["floor_slope",]
+    )
 
 
 @pytest.mark.parametrize("friction", [0.0005, 0.5])

@@ -21,6 +21,8 @@ DISCREPANCY, SHORT_OF_IT = 0.04, 0.5
 noise floor, and where even they do not."""
 FLOOR = 1.015
 """A set that needs less than this scale of the noise reaches the floor."""
+REFINED = 0.01
+"""Share of what a law explains that a law of which it is a limit has to explain beyond it."""
 JUDGED = 3
 """So many of the likeliest are held against held-out windows at most."""
 
@@ -61,21 +63,47 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
         groups.setdefault(tuple(sorted(fitted.hypothesis.effects)), []).append(fitted)
     singles = max(sum(len(key) == 1 for key in groups), 1)
     none = max(base.evidence for base in bases)
+    best = {key: max(members, key=_evidence) for key, members in groups.items()}
+    shares = {size: _discrepancy([best[key] for key in groups if len(key) == size]) for size in set(map(len, groups))}
     entries = []
     for key, members in groups.items():
-        evidence = np.array([member.evidence for member in members])
-        finite = np.where(np.isfinite(evidence), evidence, -np.inf)
         prior = math.log(options.none_odds) if not key else -len(key) * math.log(singles)
-        weight = prior + _averaged(members, finite)
+        weight = prior + _averaged(members, np.array([_evidence(member) for member in members]))
         if len(key) > 1:
             # A law that is a little wrong leaves a share of what it explains, which any other effect may take.
-            parts = [set(other) for other in groups if other and set(other) < set(key)]
-            known = [max(m.evidence for m in groups[tuple(sorted(part))]) for part in parts]
-            best = members[int(np.argmax(finite))]
-            share = DISCREPANCY if best.noise_scale < FLOOR else SHORT_OF_IT
-            weight -= share * max(max(known, default=none) - none, 0.0)
-        entries.append(Weighed(key, members[int(np.argmax(finite))], weight, 0.0, False))
+            parts = [other for other in groups if other and set(other) < set(key)]
+            known = max((_evidence(best[part]) for part in parts), default=none)
+            weight -= shares[len(key)] * max(known - none, 0.0)
+        limits = [_evidence(best[other]) for other in _limits(key) if other in groups]
+        weight -= REFINED * max(max(limits, default=none) - none, 0.0)
+        entries.append(Weighed(key, best[key], weight, 0.0, False))
     return _ordered(entries)
+
+
+def _evidence(fitted: Fitted) -> float:
+    """Return the evidence of a hypothesis, minus infinity where it has none [nat]."""
+    return fitted.evidence if math.isfinite(fitted.evidence) else -math.inf
+
+
+def _discrepancy(sets: Sequence[Fitted]) -> float:
+    """Return the share that a set of so many effects must explain beyond its parts.
+
+    It is the same for all of them, by whether the likeliest reaches the noise floor: two sets whose scales differ by a
+    hundredth would else be hundreds of nats apart.
+    """
+    return DISCREPANCY if max(sets, key=_evidence).noise_scale < FLOOR else SHORT_OF_IT
+
+
+def _limits(effects: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Return the effects with one of them replaced by a law that is a limit of it: sliding alone, for breakaway."""
+    found = []
+    for name in effects:
+        own = {column for variant in EFFECTS[name].variants for column in variant}
+        for other, effect in EFFECTS.items():
+            columns = {column for variant in effect.variants for column in variant}
+            if other not in effects and columns < own:
+                found.append(tuple(sorted({*effects} - {name} | {other})))
+    return found
 
 
 def _averaged(members: Sequence[Fitted], evidence: NDArray[np.float64]) -> float:
