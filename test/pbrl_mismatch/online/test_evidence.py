@@ -64,10 +64,8 @@ def test_adjusting_window_by_window_is_least_squares_over_all() -> None:
         seen = slope @ truth + 0.1 * rng.normal(size=6)
         data.append(seen)
         lower = np.linalg.cholesky(np.eye(6) + slope @ covariance @ slope.T)
-        whitened = Window(
-            np.linalg.solve(lower, seen - slope @ mean), np.linalg.solve(lower, slope), np.zeros(0), np.zeros(0)
-        )
-        mean, covariance = adjusted(whitened, mean, covariance)
+        whitened = np.linalg.solve(lower, seen - slope @ mean), np.linalg.solve(lower, slope)
+        mean, covariance = adjusted(*whitened, mean, covariance)
     rows = slopes.reshape(-1, 2)
     precision = np.linalg.inv(prior) + rows.T @ rows
     np.testing.assert_allclose(mean, np.linalg.solve(precision, rows.T @ np.concatenate(data)), atol=1e-10)

@@ -38,4 +38,5 @@ EFFECT = Effect(
     direction="velocity",
     linear=("slide_mu", "breakaway_mu"),
     sticks=True,
+    limit="ground_friction",
 )

@@ -137,6 +137,7 @@ class Effect:
         remembers: whether more moves than the body, so that its past matters.
         second: whether a baseline may have one such thing already, and stands between the two.
         sticks: whether it is dry friction, which a body at rest does not show the strength of.
+        limit: name of the effect that it is the same as where what it adds to that is nothing.
     """
 
     name: str
@@ -161,6 +162,7 @@ class Effect:
     remembers: bool = False
     second: bool = False
     sticks: bool = False
+    limit: str | None = None
 
     def chosen(self, scene: Scene, variant: int) -> tuple[Parameter, ...]:
         """Return the parameters that are free in one variant."""

@@ -152,10 +152,17 @@ def log_e_value(window: Window, noise: Noise, forces: tuple[float, ...]) -> floa
     return float(np.logaddexp.reduce(found) - np.log(len(found)))
 
 
-def adjusted(window: Window, coordinates: Array, covariance: Array) -> tuple[Array, Array]:
-    """Return coordinates (K,) and covariance (K, K) after a window that the model has foretold (Kalman's update)."""
-    gain = covariance @ window.slope.T
-    return coordinates + gain @ window.residual, covariance - gain @ gain.T
+def adjusted(residual: Array, slope: Array, coordinates: Array, covariance: Array) -> tuple[Array, Array]:
+    """Return coordinates (K,) and covariance (K, K) after a window (Kalman's update).
+
+    Args:
+        residual: (n,) whitened by all that is noise or not known.
+        slope: (n, K) whitened likewise.
+        coordinates: (K,) before it.
+        covariance: (K, K) before it.
+    """
+    gain = covariance @ slope.T
+    return coordinates + gain @ residual, covariance - gain @ gain.T
 
 
 def grown(statistic: float, value: float) -> float:

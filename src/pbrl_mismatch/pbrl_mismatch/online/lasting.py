@@ -14,7 +14,7 @@ import numpy as np
 
 from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.effects.effect import Parameter, plain
-from pbrl_mismatch.online.evidence import KEPT, Array, Noise, grown, linearised, no_sharper
+from pbrl_mismatch.online.evidence import KEPT, Array, Noise, adjusted, grown, linearised, no_sharper
 from pbrl_mismatch.online.reading import Reading
 from pbrl_mismatch.search.objective import Objective
 
@@ -55,11 +55,11 @@ class Belief:
         """
         off = residual - slope @ (self.mean - at)
         lower = np.linalg.cholesky(np.eye(len(off)) + slope @ self.covariance @ slope.T)
-        white, gain = np.linalg.solve(lower, off), self.covariance @ np.linalg.solve(lower, slope).T
+        white = np.linalg.solve(lower, off)
         density = -0.5 * (noise.freedom + len(off)) * np.log(noise.squares + white @ white)
-        covariance = no_sharper(self.covariance - gain @ gain.T, self.first, KEPT)
+        mean, covariance = adjusted(white, np.linalg.solve(lower, slope), self.mean, self.covariance)
         told = float(density - np.sum(np.log(np.diag(lower))))
-        return told, replace(self, mean=self.mean + gain @ white, covariance=covariance)
+        return told, replace(self, mean=mean, covariance=no_sharper(covariance, self.first, KEPT))
 
 
 class Lasting:

@@ -35,6 +35,9 @@ class ReadingTest:
         noise: known so far.
         statistic: logarithm of R by grid.
         size: times the noise that the last windows' poses were off along what a wrench would do, by grid.
+        coordinates: (K,) of the parameters as adjusted.
+        covariance: (K, K) of them.
+        lasting: the bet on what lasts.
     """
 
     reading: Reading
@@ -102,7 +105,7 @@ class ReadingTest:
             return
         while self._waiting and self._waiting[0][0] <= now - max(self.options.windows) + 1e-6:
             window = self.seen(self._waiting.popleft()[1])
-            self.coordinates, covariance = adjusted(window, self.coordinates, self.covariance)
+            self.coordinates, covariance = adjusted(window.residual, window.slope, self.coordinates, self.covariance)
             self.covariance = no_sharper(covariance, self.reading.covariance, KEPT)
 
     def forget(self) -> None:

@@ -95,15 +95,12 @@ def _discrepancy(sets: Sequence[Fitted]) -> float:
 
 
 def _limits(effects: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """Return the effects with one of them replaced by a law that is a limit of it: sliding alone, for breakaway."""
-    found = []
-    for name in effects:
-        own = {column for variant in EFFECTS[name].variants for column in variant}
-        for other, effect in EFFECTS.items():
-            columns = {column for variant in effect.variants for column in variant}
-            if other not in effects and columns < own:
-                found.append(tuple(sorted({*effects} - {name} | {other})))
-    return found
+    """Return the effects with one of them replaced by its limit: sliding alone, for breakaway."""
+    return [
+        tuple(sorted({*effects} - {name} | {limit}))
+        for name in effects
+        if (limit := EFFECTS[name].limit) is not None and limit not in effects
+    ]
 
 
 def _averaged(members: Sequence[Fitted], evidence: NDArray[np.float64]) -> float:
