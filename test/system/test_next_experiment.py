@@ -163,4 +163,8 @@ def test_the_next_experiment_is_run_and_the_odds_change(user: User) -> None:
 
 
 def probabilities(found: Found) -> dict[str, float]:
-    return {each["effect"]: each["probability"] for key in ("effects", "alternatives") for each in found.report[key]}
+    """Return the probability of each effect's likeliest hypothesis: it may stand in a set of two as well."""
+    odds: dict[str, float] = {}
+    for each in (*found.report["effects"], *found.report["alternatives"]):
+        odds[each["effect"]] = max(odds.get(each["effect"], 0.0), each["probability"])
+    return odds
