@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from pbrl_bringup.concealed import oracle
-from pbrl_bringup.concealed.oracle import STARTS, Oracle, non_centrality
+from pbrl_bringup.concealed.oracle import JITTER, STARTS, Oracle, non_centrality, starts_told
 
 
 def test_one_number_is_found_in_95_percent_where_the_two_tails_say() -> None:
@@ -38,7 +37,9 @@ def fitted(parameters: int, misfit: float, beside: float = 0.0) -> Any:
         likelihood=lambda value: -0.5 * value, prior_misfit=lambda coordinates: np.zeros(len(coordinates))
     )
     peak = SimpleNamespace(objective=objective, misfit=np.array([misfit]), coordinates=np.zeros((1, parameters)))
-    return SimpleNamespace(hypothesis=SimpleNamespace(parameters=range(parameters)), peak=peak, beside=beside)
+    return SimpleNamespace(
+        hypothesis=SimpleNamespace(parameters=range(parameters)), peak=peak, beside=beside, traced=None
+    )
 
 
 @pytest.mark.parametrize("times", [0.5, 1.0, 3.0])
@@ -62,14 +63,37 @@ def test_nothing_gained_is_no_strength() -> None:
     assert Oracle(fitted(7, 999.0), fitted(3, 1000.0)).times_detectable == 0.0
 
 
-def test_its_starts_lie_beside_the_truth_on_every_scale(monkeypatch: pytest.MonkeyPatch) -> None:
-    taken: list[Any] = []
-    monkeypatch.setattr(oracle, "fit_from", lambda hypothesis, stages, starts, options: taken.append(starts))
-    parts = [SimpleNamespace(column=f"c{k}", positive=False) for k in range(50)]
-    told = {part.column: 3.0 for part in parts}
-    asked: Any = SimpleNamespace(mean=np.zeros(50), spread=np.full(50, 2.0), parameters=parts)
-    laid: Any = SimpleNamespace(options=SimpleNamespace(seed=0), stages=None)
-    oracle._fitted(asked, told, None, laid, STARTS)
-    np.testing.assert_array_equal(taken[0][0], 3.0)
-    off = np.sqrt(np.mean(((taken[0][1:] - 3.0) / 2.0) ** 2, axis=1))
-    assert np.all(np.diff(off) < 0.0) and off[-1] == pytest.approx(oracle.JITTER[1], rel=0.3)
+def asked(columns: list[str]) -> Any:
+    """Return a hypothesis with some columns, none of which is positive."""
+    parts = [SimpleNamespace(column=column, positive=False) for column in columns]
+    return SimpleNamespace(
+        mean=np.zeros(len(parts)), spread=np.full(len(parts), 2.0), parameters=parts, columns=tuple(columns)
+    )
+
+
+def test_its_starts_lie_beside_the_truth_on_every_scale() -> None:
+    columns = [f"c{k}" for k in range(50)]
+    starts = starts_told(asked(columns), dict.fromkeys(columns, 3.0), None, STARTS, np.random.default_rng(0))
+    np.testing.assert_array_equal(starts[0], 3.0)
+    off = np.sqrt(np.mean(((starts[1:] - 3.0) / 2.0) ** 2, axis=1))
+    assert np.all(np.diff(off) < 0.0) and off[-1] == pytest.approx(JITTER[1], rel=0.3)
+
+
+def test_it_starts_from_where_the_body_is_without_the_effect_as_well() -> None:
+    # One wheel between two does what both do: from the true place of one of them nothing leads there.
+    base: Any = SimpleNamespace(
+        hypothesis=asked(["mass", "wheel_x"]), peak=SimpleNamespace(coordinates=np.array([[0.5, -0.7]]))
+    )
+    told = {"wheel_x": 0.2, "drag": 4.0}
+    starts = starts_told(asked(["mass", "wheel_x", "drag"]), told, base, STARTS, np.random.default_rng(0))
+    np.testing.assert_array_equal(starts[0], [0.5, 0.2, 4.0])
+    np.testing.assert_array_equal(starts[1], [0.5, -0.7, 4.0])
+
+
+def test_what_is_better_along_the_path_counts() -> None:
+    told, none = fitted(7, 900.0), fitted(3, 1000.0)
+    weak = Oracle(told, none).times_detectable
+    told.traced = SimpleNamespace(log_posterior=-0.5 * 800.0)
+    assert Oracle(told, none).times_detectable > weak
+    none.traced = SimpleNamespace(log_posterior=-0.5 * 790.0)
+    assert Oracle(told, none).times_detectable == 0.0

@@ -19,6 +19,7 @@ from scipy.stats import chi2, ncx2
 
 from pbrl_bag.types import Recording
 from pbrl_bringup.concealed.truth import Truth
+from pbrl_mismatch.data.cuts import Cuts, cut_windows
 from pbrl_mismatch.data.grip import lay_grips
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.diagnose import fit_baselines, track_of
@@ -28,6 +29,7 @@ from pbrl_mismatch.search.explain import led
 from pbrl_mismatch.search.fitted import Fitted, Stages, cut_stages, fit_from, judged, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way, grip_evidence
 from pbrl_mismatch.search.hypothesis import BaselineOptions, Hypothesis, baselines
+from pbrl_mismatch.search.library import trace
 from pbrl_mismatch.search.told_baseline import ToldBaseline
 
 Array = NDArray[np.float64]
@@ -83,10 +85,10 @@ def non_centrality(freedom: int, level: float = 0.05, power: float = 0.95) -> fl
 
 
 def _height(fitted: Fitted) -> float:
-    """Return the log posterior at its best point, with what the grippers' poses say [nat]."""
+    """Return the log posterior at its best point, simulated or along the path, with what the grippers say [nat]."""
     objective, peak = fitted.peak.objective, fitted.peak
-    motion = objective.likelihood(peak.misfit)[0] - 0.5 * objective.prior_misfit(peak.coordinates)[0]
-    return float(motion) + fitted.beside
+    motion = float(objective.likelihood(peak.misfit)[0] - 0.5 * objective.prior_misfit(peak.coordinates)[0])
+    return (motion if fitted.traced is None else max(motion, fitted.traced.log_posterior)) + fitted.beside
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,7 @@ class Laid:
     Attributes:
         track: of the body.
         stages: windows of growing length.
+        longest: windows of the path.
         grip: what the grippers' poses say, where they say anything.
         options: of a diagnosis.
         baseline: a model that counts as no mismatch; None: every kind of body that does.
@@ -103,6 +106,7 @@ class Laid:
 
     track: Track
     stages: Stages
+    longest: Cuts
     grip: GripEvidence | None
     options: DiagnoseOptions
     baseline: ToldBaseline | None = None
@@ -120,7 +124,7 @@ def lay_out(recording: Recording, body: str, baseline: ToldBaseline | None = Non
     track = track_of(recording, body)
     grips = lay_grips(recording, track)
     grip = None if grips is None else grip_evidence(grips, options.delay_spread)
-    return Laid(track, cut_stages(track, options), grip, options, baseline)
+    return Laid(track, cut_stages(track, options), cut_windows(track, max(options.windows)), grip, options, baseline)
 
 
 def oracle(laid: Laid, truth: Truth) -> Oracle:
@@ -140,13 +144,14 @@ def oracle(laid: Laid, truth: Truth) -> Oracle:
 def _bases(laid: Laid) -> list[Fitted]:
     rng = np.random.default_rng(laid.options.seed)
     bases = fit_baselines(rng, laid.track, laid.stages, laid.options, laid.baseline)
-    return [beside_motion(each, laid.grip) for each in bases]
+    traced = [trace(laid.longest, laid.options, each, each.peak.coordinates) for each in bases]
+    return [beside_motion(each, laid.grip) for each in traced]
 
 
 def _best_told(laid: Laid, truth: Truth, bases: list[Fitted]) -> Fitted:
     """Return the likeliest told fit on the bases of the true kind."""
     true = [each for each in bases if laid.baseline is not None or each.hypothesis.variant == _kind(truth)]
-    return max((_told(laid, truth, each, STARTS) for each in true), key=lambda each: each.evidence)
+    return max((_told(laid, truth, each, STARTS) for each in true), key=_evidence)
 
 
 def seen(laid: Laid, truth: Truth) -> Oracle | None:
@@ -161,15 +166,35 @@ def seen(laid: Laid, truth: Truth) -> Oracle | None:
         return None
     found = oracle(laid, truth)
     if found.times_detectable >= 1.0 and len(truth.effects) > 1:
-        found = replace(found, without=_without_each(laid, truth))
+        found = _beside_parts(laid, truth, found)
     return found if found.times_detectable >= 1.0 else None
 
 
-def _without_each(laid: Laid, truth: Truth) -> tuple[Fitted, ...]:
-    """Return what is reached with each of several effects left out."""
+def _beside_parts(laid: Laid, truth: Truth, found: Oracle) -> Oracle:
+    """Return an oracle with what is reached with each of several effects left out, all led to where the others are.
+
+    Where feet stick there are many tops: what has all effects and what lacks one may be on different ones.
+    """
     bases = _bases(laid)
     rests = [replace(truth, effects=tuple(o for o in truth.effects if o != name)) for name in truth.effects]
-    return tuple(_best_told(laid, rest, bases) for rest in rests)
+    fits = [_best_told(laid, rest, bases) for rest in rests]
+    tops = [found.fitted]
+    if GRASP_COMPLIANCE not in truth.effects:  # which is laid on a top as it is
+        tops += [_laid_on(laid, truth, tops[0].hypothesis, *each) for each in zip(truth.effects, fits, strict=True)]
+    fitted = max(tops, key=_evidence)
+    without = tuple(led([each], [fitted], laid.stages, laid.options)[0] for each in fits)
+    return replace(found, fitted=judged(fitted, laid.stages, laid.options), without=without)
+
+
+def _laid_on(laid: Laid, truth: Truth, hypothesis: Hypothesis, name: str, rest: Fitted) -> Fitted:
+    """Return a hypothesis fitted from where all but one of its effects are without that one, which is told."""
+    own = {column for variant in EFFECTS[name].variants for column in variant} - set(rest.hypothesis.columns)
+    told = {column: value for column, value in truth.told.items() if column in own}
+    return beside_motion(_fitted(hypothesis, told, rest, laid, STARTS), laid.grip)
+
+
+def _evidence(fitted: Fitted) -> float:
+    return fitted.evidence
 
 
 def _glance(laid: Laid, truth: Truth) -> Oracle:
@@ -206,20 +231,47 @@ def _told(laid: Laid, truth: Truth, base: Fitted, starts: int) -> Fitted:
     fits = [_fitted(each, truth.told, base, laid, starts) for each in grounds]
     if GRASP_COMPLIANCE in truth.effects and laid.grip is not None:
         fits = [gives_way(each, laid.grip) for each in fits]
-    return max((beside_motion(each, laid.grip) for each in fits), key=lambda each: each.evidence)
+    return max((beside_motion(each, laid.grip) for each in fits), key=_evidence)
 
 
 def _fitted(hypothesis: Hypothesis, values: Mapping[str, float], base: Fitted | None, laid: Laid, count: int) -> Fitted:
-    """Climb from the truth, and from beside it; what is not told starts where the baseline is, or at its prior."""
-    centre = hypothesis.mean.copy()
+    """Climb from the truth and from beside it, see `starts_told`; more than once, along the path as well."""
+    starts = starts_told(hypothesis, values, base, count, np.random.default_rng(laid.options.seed))
+    found = fit_from(hypothesis, laid.stages, starts, laid.options)
+    if count == 1:
+        return found
+    # Each has a path of its own.
+    along = [trace(laid.longest, laid.options, found, each[None]) for each in (found.peak.coordinates[0], *starts[:2])]
+    return max(along, key=_evidence)
+
+
+def starts_told(
+    hypothesis: Hypothesis, values: Mapping[str, float], base: Fitted | None, count: int, rng: np.random.Generator
+) -> Array:
+    """Return starts (count, K): the truth, where the baseline has the body's own parameters, and beside the truth.
+
+    What is not told starts where the baseline is, or at its prior. Without one of its effects a body's best is seldom
+    at the truth: one wheel between two does what both do.
+
+    Args:
+        hypothesis: that is to be fitted.
+        values: what is told, by column.
+        base: what the hypothesis is laid on.
+        count: of starts.
+        rng: source of randomness.
+    """
+    centre, own = hypothesis.mean.copy(), {}
     for k, parameter in enumerate(hypothesis.parameters):
         told = values.get(parameter.column)
         if told is not None:
             centre[k] = math.log(max(told, 1e-6)) if parameter.positive else told
-        elif base is not None and parameter.column in base.hypothesis.columns:
-            centre[k] = base.peak.coordinates[0, base.hypothesis.columns.index(parameter.column)]
-    rng = np.random.default_rng(laid.options.seed)
+        if base is not None and parameter.column in base.hypothesis.columns:
+            own[k] = base.peak.coordinates[0, base.hypothesis.columns.index(parameter.column)]
+            centre[k] = own[k] if told is None else centre[k]
     beside = np.geomspace(*JITTER, count)[:, None] * hypothesis.spread
     starts = centre + beside * rng.standard_normal((count, len(centre)))
     starts[0] = centre
-    return fit_from(hypothesis, laid.stages, starts, laid.options)
+    if own and count > 1:
+        starts[1] = centre
+        starts[1, list(own)] = list(own.values())
+    return starts

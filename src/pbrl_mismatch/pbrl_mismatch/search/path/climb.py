@@ -42,6 +42,12 @@ class PathPeak:
         """Return (K, K) of the coordinates at one point."""
         return np.asarray(np.linalg.inv(self.matrix[row] + np.diag(self.hypothesis.spread**-2.0)), dtype=np.float64)
 
+    def log_posterior(self, row: int) -> float:
+        """Return the log posterior density at one point [nat]: its evidence without the volume about it."""
+        spread = self.hypothesis.spread
+        _, log_det = np.linalg.slogdet(self.matrix[row] * np.outer(spread, spread) + np.eye(len(spread)))
+        return float(self.evidence[row] + 0.5 * log_det)
+
     @property
     def noise_scale(self) -> float:
         """Return the least scale of the noise over all windows that a start needs, at least one."""

@@ -121,6 +121,7 @@ class Traced:
         hypothesis: what was fitted.
         coordinates: (K,).
         evidence: log evidence by Laplace [nat], on the scale of simulated windows.
+        log_posterior: density at that point, on the same scale [nat].
         noise_scale: scale of the noise that it needs, at least one.
         size: of the left-out force [N].
         along: the windows.
@@ -129,6 +130,7 @@ class Traced:
     hypothesis: Hypothesis
     coordinates: Array
     evidence: float
+    log_posterior: float
     noise_scale: float
     size: float
     along: Along
@@ -149,7 +151,8 @@ def traced(hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float) -> T
     found = climb_along(along, hypothesis, starts, ITERATIONS)
     best = int(np.argmax(found.evidence))
     scale = float(np.sqrt(max(1.0, found.misfit[best].sum() / along.counts.sum())))
-    return Traced(hypothesis, found.coordinates[best], float(found.evidence[best]), scale, lacks.size, along)
+    evidence, density = float(found.evidence[best]), found.log_posterior(best)
+    return Traced(hypothesis, found.coordinates[best], evidence, density, scale, lacks.size, along)
 
 
 def traced_score(found: Traced, kept: Cuts, whole: Cuts, floor: float) -> float:
