@@ -37,6 +37,8 @@ WITH_MOST = (*WITH_SETS, "kills", "fence")
 """Benches whose cases can be counted."""
 WITH_MINUTES = (*WITH_MOST, "soak")
 """Benches that can end after a time."""
+WITH_CARRY = ("concealed", "kills", "fence")
+"""Benches of hours, whose cases can be done on one machine after another."""
 
 EXPERIMENTS = {
     "shopping-cart": "figure 23a: agents push a cart round a wall to a goal, without noise",

@@ -107,6 +107,8 @@ def test_a_quick_run_is_small_and_sets_can_be_chosen() -> None:
         command("wheel", None, 0, True, [], 2)
     with pytest.raises(BringupError, match="bench wheel: expected no --minutes"):
         command("wheel", None, 0, True, [], None, 2.0)
+    with pytest.raises(BringupError, match="bench wheel: expected no --carry"):
+        command("wheel", None, 0, True, [], None, None, Path("cases.jsonl"))
 
 
 def test_pairs_are_sensible_and_the_same_for_the_same_seed() -> None:

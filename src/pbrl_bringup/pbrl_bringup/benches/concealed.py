@@ -14,6 +14,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pbrl_bringup.benches.carried import Carried
 from pbrl_bringup.benches.concealed_figures import draw_all
 from pbrl_bringup.benches.concealed_rows import rows_of
 from pbrl_bringup.benches.rows import Measured
@@ -22,6 +23,11 @@ from pbrl_bringup.concealed.scoring import Score
 from pbrl_bringup.concealed.sets import Trial, evenly, trials_of
 from pbrl_bringup.parallel import in_parallel
 from pbrl_bringup.terminal import say
+
+CARRIED = Carried(
+    ("cases/*/score.json", "cases/*/unmade.txt"),
+    ("bullet_sim", "pbrl_bag", "pbrl_bringup.concealed", "pbrl_bringup.rivals", "pbrl_mismatch", "pbrl_model"),
+)
 
 
 def measure(

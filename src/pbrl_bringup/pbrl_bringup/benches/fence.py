@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from pbrl_bringup.benches.carried import Carried
 from pbrl_bringup.benches.fence_missions import LONGEST, Mission, mission
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.errors import BringupError
@@ -17,6 +18,12 @@ MISSIONS, QUICK_MISSIONS = 500, 4
 """A quick one has one of each kind."""
 LEAST = 0.005
 """[m] that is left, at least, where it is nearest."""
+
+
+CARRIED = Carried(
+    ("missions/*.json",),
+    ("bullet_sim", "krang_sim", "pbrl_bringup.benches.fence_missions", "pbrl_control", "pbrl_namo"),
+)
 
 
 def measure(seed: int, quick: bool, out: Path, *, most: int | None = None, minutes: float | None = None) -> Measured:

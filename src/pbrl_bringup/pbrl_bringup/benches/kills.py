@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from pbrl_bringup.benches.carried import Carried
 from pbrl_bringup.benches.rows import Measured, Row, at_least, at_most
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments.kept import keep_run, read_run
@@ -28,6 +29,12 @@ class Lived:
     """What became of the cases that shared a graph."""
 
     outcomes: tuple[Outcome, ...]
+
+
+CARRIED = Carried(
+    ("lives/*.json",),
+    ("bullet_sim", "krang_sim", "pbrl_bag", "pbrl_bringup.kills", "pbrl_control", "pbrl_model", "pbrl_namo"),
+)
 
 
 def measure(seed: int, quick: bool, out: Path, *, most: int | None = None, minutes: float | None = None) -> Measured:

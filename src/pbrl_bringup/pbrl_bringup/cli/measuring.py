@@ -36,11 +36,15 @@ def bench(
     minutes: Annotated[
         float | None, typer.Option(min=0.0, help="After which no case is begun; what there is is reported.")
     ] = None,
+    carry: Annotated[
+        Path | None,
+        typer.Option(help="A file of cases that are done: they are not done again, and those done now are added."),
+    ] = None,
     scheduler: Scheduler = None,
 ) -> int:
     """Measure one group of acceptance rows; the last line is the report as JSON."""
     wanted = [each.strip() for each in sets.split(",")] if sets is not None else []
-    asked = {"sets": wanted, "most": most, "minutes": minutes, "scheduler": scheduler}
+    asked = {"sets": wanted, "most": most, "minutes": minutes, "carry": carry, "scheduler": scheduler}
     return hand_over("bench", name=name, out=out, seed=seed, quick=quick, **asked)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from rich.text import Text
 
+from pbrl_bringup.benches.carried import carry_in, carry_out
 from pbrl_bringup.benches.rows import last_line, report
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.files import output_folder
@@ -27,6 +28,7 @@ def run_measured(
     quick: bool,
     more: Mapping[str, Any] | None = None,
     scheduler: str | None = None,
+    carry: Path | None = None,
 ) -> int:
     """Run the module `pbrl_bringup.<kind>s.<name>`.
 
@@ -39,9 +41,10 @@ def run_measured(
         quick: whether to do a smaller version.
         more: what only this one can be asked, by name.
         scheduler: where its independent parts are done, as `--scheduler` has it; None: in processes of this machine.
+        carry: file of cases that are done, to which those done now are added; of modules that have `CARRIED`.
 
     Raises:
-        BringupError: there is none of that name, or no such scheduler.
+        BringupError: there is none of that name, no such scheduler, or the file carries something else.
     """
     if name not in known:
         near = difflib.get_close_matches(name, known, 1)
@@ -53,8 +56,15 @@ def run_measured(
     output_folder(folder)
     say(f"pbrl: {kind} {name}: {known[name]}; seed {seed}, results in {folder}")
     module = import_module(f"pbrl_bringup.{PACKAGES[kind]}.{name.replace('-', '_')}")
-    with _sent(scheduler):
-        summary = report(name, seed, partial(module.measure, **(more or {})), quick, folder)
+    told = {"name": name, "seed": seed}
+    if carry is not None:
+        say(f"pbrl: {carry_in(carry, folder, told, module.CARRIED)} files of cases that were done, from {carry}")
+    try:
+        with _sent(scheduler):
+            summary = report(name, seed, partial(module.measure, **(more or {})), quick, folder)
+    finally:  # also what a bench that was interrupted has done
+        if carry is not None:
+            carry_out(carry, folder, told, module.CARRIED)
     rows = [
         (row["what"], _value(row["value"]), row["unit"], row["goal"], _mark(row["holds"])) for row in summary["rows"]
     ]
