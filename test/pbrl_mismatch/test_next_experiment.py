@@ -17,6 +17,7 @@ from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 from pbrl_mismatch.next_experiment.candidates import Candidates, Reach, candidates_of, inside_by, outline_points
 from pbrl_mismatch.next_experiment.experiment import (
+    LOOKED_INTO,
     SEGMENTS,
     expected_bits,
     hand_of,
@@ -207,6 +208,14 @@ def test_the_choice_is_the_best_candidate_and_better_than_chance(track: Any, hyp
     report = json.loads(json.dumps(best.to_report(), allow_nan=False))
     assert set(report) == {"object", "contact_point", "direction", "speed", "duration", "expected_bits"}
     assert "viscous_drag" in best.sentence()
+
+
+def test_what_a_glance_leaves_is_as_good_as_the_best_of_all(track: Any, hypotheses: tuple[Weighed, ...]) -> None:
+    pushes = candidates_of(np.random.default_rng(0), track, Reach())
+    low, _ = expected_bits(np.random.default_rng(1), track, hypotheses, pushes, Reach())
+    best = next_experiment(np.random.default_rng(0), track, hypotheses)
+    assert len(pushes) > LOOKED_INTO and best is not None
+    assert best.expected_bits == pytest.approx(low.max(), rel=0.05)
 
 
 def test_one_hypothesis_or_no_reach_needs_no_push(track: Any, hypotheses: tuple[Weighed, ...]) -> None:

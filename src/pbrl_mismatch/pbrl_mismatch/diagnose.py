@@ -248,7 +248,7 @@ def _diagnose_object(
     mismatch = verdict.p_value < options.level
     weighed = held_against(explained, baseline, options) if mismatch else ()
     if weighed and weighed[0].effects:
-        likeliest = with_draws(np.random.default_rng(fourth), weighed[0].fitted)
+        likeliest = with_draws(np.random.default_rng(fourth), weighed[0].fitted, options.workers)
         weighed = (replace(weighed[0], fitted=likeliest), *weighed[1:])
     scene, rng = scene_of(track, baseline.row), np.random.default_rng(third)
     found = findings_of(baseline, weighed, scene)

@@ -9,6 +9,8 @@ Laplace's Gaussian, spreads in a flattened density, and is cooled.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from pbrl_mismatch.search.climb import Peak
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
+from pbrl_mismatch.search.hypothesis import Hypothesis
 
 Array = NDArray[np.float64]
 
@@ -54,7 +57,7 @@ class Density:
         return self._objective.likelihood(squares) - 0.5 * self._objective.prior_misfit(points)
 
 
-def with_draws(rng: np.random.Generator, fitted: Fitted) -> Fitted:
+def with_draws(rng: np.random.Generator, fitted: Fitted, workers: int = 1) -> Fitted:
     """Return a fitted hypothesis with draws of its coordinates.
 
     What the grippers' poses say of a hold that gives way is a Gaussian of its own: such a hypothesis stays as it is.
@@ -62,15 +65,25 @@ def with_draws(rng: np.random.Generator, fitted: Fitted) -> Fitted:
     Args:
         rng: of the draws.
         fitted: over simulated windows.
+        workers: threads; the bytes do not depend on it.
     """
     if GRASP_COMPLIANCE in fitted.hypothesis.effects:
         return fitted
-    return replace(fitted, draws=evolved(rng, fitted.peak))
+    return replace(fitted, draws=evolved(rng, fitted.peak, workers))
 
 
-def evolved(rng: np.random.Generator, peak: Peak) -> Array:
-    """Return draws (POPULATION * KEPT, K) of the density around the first point of a peak."""
+def evolved(rng: np.random.Generator, peak: Peak, workers: int = 1) -> Array:
+    """Return draws (POPULATION * KEPT, K) of the density around the first point of a peak, in so many threads."""
     density, hypothesis = Density(peak), peak.objective.hypothesis
+    with ThreadPoolExecutor(workers) as pool:
+
+        def of_all(points: Array) -> Array:
+            return np.concatenate(list(pool.map(density, np.array_split(points, workers))))
+
+        return _evolved(rng, peak, hypothesis, of_all)
+
+
+def _evolved(rng: np.random.Generator, peak: Peak, hypothesis: Hypothesis, density: Callable[[Array], Array]) -> Array:
     size = len(hypothesis.spread)
     values, vectors = np.linalg.eigh(peak.covariance(0))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
