@@ -30,10 +30,10 @@ def test_richer_kinds_are_tried_only_where_they_are_worth_it(worse: float, count
     assert len(_grounds([base(3, 0.0), base(8, -1.0)])) == 1
 
 
-def weighed(effects: str, evidence: float) -> Any:
-    """Return a hypothesis of effects joined by "+", as it is weighed."""
+def weighed(effects: str, evidence: float, beside: float = 0.0) -> Any:
+    """Return a hypothesis of effects joined by "+", as it is weighed; so much of its evidence is beside the motion."""
     names = tuple(name for name in effects.split("+") if name)
-    fitted = SimpleNamespace(hypothesis=SimpleNamespace(effects=names), evidence=evidence)
+    fitted = SimpleNamespace(hypothesis=SimpleNamespace(effects=names), evidence=evidence, of_motion=evidence - beside)
     return SimpleNamespace(effects=names, fitted=fitted)
 
 
@@ -54,6 +54,11 @@ def test_what_explains_little_or_gives_way_is_no_ground(monkeypatch: Any) -> Non
     little = 0.9 * OF_THE_BEST * 100.0
     entries = (weighed("tether", 100.0), weighed("grasp_compliance", 90.0), weighed("detent", little), weighed("", 0.0))
     assert grounds(entries, 1, lacks=True, patch=monkeypatch) == ["tether"]
+
+
+def test_what_a_grip_tells_beside_the_motion_hides_no_law_of_the_motion(monkeypatch: Any) -> None:
+    entries = (weighed("grasp_compliance", 1000.0, beside=1000.0), weighed("tether", 90.0), weighed("", 0.0))
+    assert grounds(entries, 1, lacks=True, patch=monkeypatch) == ["grasp_compliance", "tether"]
 
 
 def test_only_hypotheses_of_the_asked_number_of_effects_are_grounds(monkeypatch: Any) -> None:

@@ -15,7 +15,7 @@ from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.fitted import Fitted, Stages, alone, judged
+from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart_rows, judged
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
 from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
 from pbrl_mismatch.search.library import search_library, trace
@@ -37,6 +37,8 @@ REACHED = 1.12
 """A hypothesis that needs less than this scale of the noise predicts windows of its length."""
 POLISHED, POLISHED_OF_SETS, LONGER = 5, 3, 2
 """So many of the likeliest effects, and of the likeliest sets, are climbed on, for so many times the usual steps."""
+TRIED_OUT, GO_ON = 4, 4
+"""Steps that every start of a climb on has, and how many starts go on from there."""
 EXPLAINS = 10.0
 """What is likelier than the baseline by more explains something [nat]."""
 LEADS = 3
@@ -149,12 +151,12 @@ def _parts_led(best: Fitted, tried: list[Fitted], stages: Stages, options: Diagn
 
 def _grounds_of_sets(weighed: tuple[Weighed, ...], depth: int, track: Track, lacks: bool) -> list[Fitted]:
     """Return the hypotheses of so many effects that one more is tried on: a pin too, where a place stood still."""
-    none = max(each.fitted.evidence for each in weighed if not each.effects)
+    none = max(each.fitted.of_motion for each in weighed if not each.effects)
     likeliest = [each.fitted for each in weighed if len(each.effects) == depth]
-    least = none + OF_THE_BEST * (likeliest[0].evidence - none)
+    least = none + OF_THE_BEST * (max(each.of_motion for each in likeliest) - none)
     # A hold that gives way is laid on a motion as it is.
     others = [
-        each for each in likeliest[1:] if each.evidence > least and GRASP_COMPLIANCE not in each.hypothesis.effects
+        each for each in likeliest[1:] if each.of_motion > least and GRASP_COMPLIANCE not in each.hypothesis.effects
     ]
     chosen = [likeliest[0], *(others[: GROUNDS_OF_SETS - 1] if lacks else [])]
     pins = [each for each in likeliest if any(EFFECTS[name].pins for name in each.hypothesis.effects)]
@@ -221,7 +223,11 @@ def _polished(
 def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseOptions) -> Fitted:
     """Return a hypothesis climbed on from where it is, and from where another has the body's own parameters."""
     objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
-    peak = climb(objective, *_starts(fitted, best), iterations=LONGER * options.iterations[-1])
+    first = climb(objective, *_starts(fitted, best), iterations=TRIED_OUT, rough=True)
+    order = np.argsort(-np.nan_to_num(first.evidence, nan=-np.inf), kind="stable")
+    likely = first.take(order[apart_rows(first.coordinates[order], fitted.hypothesis.spread, GO_ON)])
+    more = LONGER * options.iterations[-1] - TRIED_OUT
+    peak = climb(objective, likely.coordinates, likely.nuisance, iterations=more)
     better = float(peak.evidence.max()) > float(fitted.peak.evidence[0])
     found = replace(fitted, peak=alone(peak)) if better else fitted
     if found.traced is None or best.traced is None or not best.traced.evidence > found.traced.evidence:

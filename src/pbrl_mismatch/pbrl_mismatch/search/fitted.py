@@ -111,8 +111,13 @@ class Fitted:
         Simulated windows and the recorded path are two approximations of one integral: a simulation runs away where
         feet stick and let go, the path is as uncertain as its smoothing. Both err by losing, so that the better counts.
         """
+        return self.of_motion + self.beside
+
+    @property
+    def of_motion(self) -> float:
+        """Return the part of the log evidence that is not beside the motion [nat]."""
         simulated = float(self.peak.evidence[0])
-        return (simulated if self.traced is None else max(simulated, self.traced.evidence)) + self.beside
+        return simulated if self.traced is None else max(simulated, self.traced.evidence)
 
     def over_shorter(self) -> Fitted:
         """Return this as it was over the next shorter windows, if that is known."""
@@ -197,13 +202,18 @@ def fit_from(hypothesis: Hypothesis, stages: Stages, starts: Array, options: Dia
 
 def apart(coordinates: Array, spread: Array, count: int) -> Array:
     """Return the first points of a list, leaving out those next to one that is already in."""
-    kept: list[Array] = []
-    for point in coordinates:
-        if all(np.max(np.abs(point - other) / spread) > 0.02 for other in kept):
-            kept.append(point)
+    return coordinates[apart_rows(coordinates, spread, count)]
+
+
+def apart_rows(coordinates: Array, spread: Array, count: int) -> NDArray[np.int64]:
+    """Return which points of a list `apart` returns."""
+    kept: list[int] = []
+    for k, point in enumerate(coordinates):
+        if all(np.max(np.abs(point - coordinates[other]) / spread) > 0.02 for other in kept):
+            kept.append(k)
         if len(kept) == count:
             break
-    return np.array(kept)
+    return np.array(kept, dtype=np.int64)
 
 
 def fit_baseline(

@@ -70,10 +70,10 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
         prior = math.log(options.none_odds) if not key else -len(key) * math.log(singles)
         weight = prior + _averaged(members, np.array([_evidence(member) for member in members]))
         if len(key) > 1:
-            # A law that is a little wrong leaves a share of what it explains, which any other effect may take.
-            parts = [other for other in groups if other and set(other) < set(key)]
-            known = max((_evidence(best[part]) for part in parts), default=none)
-            weight -= shares[len(key)] * max(known - none, 0.0)
+            # A law that is a little wrong leaves a share of what it explains of the motion, which any other may take.
+            parts = [best[other] for other in groups if other and set(other) < set(key)]
+            known = max((_of_motion(part) for part in parts), default=-math.inf)
+            weight -= shares[len(key)] * max(known - _of_motion(best[()]), 0.0)
         limits = [_evidence(best[other]) for other in _limits(key) if other in groups]
         weight -= REFINED * max(max(limits, default=none) - none, 0.0)
         entries.append(Weighed(key, best[key], weight, 0.0, False))
@@ -83,6 +83,11 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
 def _evidence(fitted: Fitted) -> float:
     """Return the evidence of a hypothesis, minus infinity where it has none [nat]."""
     return fitted.evidence if math.isfinite(fitted.evidence) else -math.inf
+
+
+def _of_motion(fitted: Fitted) -> float:
+    """Return its part that is not beside the motion, minus infinity where it has none [nat]."""
+    return fitted.of_motion if math.isfinite(fitted.of_motion) else -math.inf
 
 
 def _discrepancy(sets: Sequence[Fitted]) -> float:
@@ -118,8 +123,8 @@ def _averaged(members: Sequence[Fitted], evidence: NDArray[np.float64]) -> float
 def worth_of_another(weighed: Sequence[Weighed]) -> float:
     """Return how much likelier one effect more must make the likeliest hypothesis to be likelier than it [nat]."""
     singles = max(sum(len(each.effects) == 1 for each in weighed), 1)
-    none = max(each.fitted.evidence for each in weighed if not each.effects)
-    return math.log(singles) + DISCREPANCY * max(weighed[0].fitted.evidence - none, 0.0)
+    none = max(each.fitted.of_motion for each in weighed if not each.effects)
+    return math.log(singles) + DISCREPANCY * max(weighed[0].fitted.of_motion - none, 0.0)
 
 
 def veto(weighed: Sequence[Weighed], baseline: Fitted, judge: Callable[[Fitted], Fitted]) -> tuple[Weighed, ...]:
