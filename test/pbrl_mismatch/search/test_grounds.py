@@ -7,7 +7,16 @@ from typing import Any
 
 import pytest
 
-from pbrl_mismatch.search.explain import GROUNDS_OF_SETS, LED, OF_THE_BEST, WORTH_A_KIND, _grounds, _grounds_of_sets
+from pbrl_mismatch import DiagnoseOptions
+from pbrl_mismatch.search.explain import (
+    GROUNDS_OF_SETS,
+    LED,
+    OF_THE_BEST,
+    WORTH_A_KIND,
+    _grounds,
+    _grounds_of_sets,
+    _lacks,
+)
 
 
 def base(parameters: int, evidence: float) -> Any:
@@ -71,3 +80,11 @@ def test_a_pin_is_a_ground_where_a_place_stood_still(monkeypatch: Any) -> None:
     entries = (weighed("tether", 100.0), weighed("hidden_hinge", 1.0), weighed("", 0.0))
     assert grounds(entries, 1, lacks=False, pinned=True, patch=monkeypatch) == ["tether", "hidden_hinge"]
     assert grounds(entries, 1, lacks=False, pinned=False, patch=monkeypatch) == ["tether"]
+
+
+def test_what_needs_more_noise_than_there_is_leaves_something_out(monkeypatch: Any) -> None:
+    # A simulation that is far off is off by what a wrench explains and by the rest: their ratio says nothing then.
+    monkeypatch.setattr("pbrl_mismatch.search.explain.predictive_test", lambda peak, row: SimpleNamespace(p_value=0.5))
+    for scale, lacks in ((1.0, False), (1.1, False), (1.2, True)):
+        fitted: Any = SimpleNamespace(noise_scale=scale, peak=None)
+        assert _lacks(fitted, None, DiagnoseOptions()) is lacks
