@@ -259,17 +259,21 @@ class _Searched:
 
 
 def _search(rng: np.random.Generator, recording: Recording, name: str, options: FitOptions) -> _Searched:
-    """Find the modes. Where poses prove late, put the wrenches onto their clock and climb again."""
+    """Find the modes. Where poses prove late, put the wrenches onto their clock and climb again, while it is better."""
     motions, parts, target = _observed(recording, name, options, 0.0)
-    modes = find_modes(rng, target, parts.searched, _plan(options))
+    best = _Searched(motions, parts, target, find_modes(rng, target, parts.searched, _plan(options)))
     for _ in range(DELAY_ROUNDS):
-        column = target.simulated - 1
-        delay, variance = float(modes.point.position[0, column]), float(modes.covariance[0, column, column])
-        if abs(delay - motions[0].delay) < max(LEAST_DELAY, math.sqrt(variance)):
+        column, found = best.target.simulated - 1, best.modes
+        delay, variance = float(found.point.position[0, column]), float(found.covariance[0, column, column])
+        if abs(delay - best.motions[0].delay) < max(LEAST_DELAY, math.sqrt(variance)):
             break
         motions, parts, target = _observed(recording, name, options, delay)
-        modes = climb_again(rng, target, modes)
-    return _Searched(motions, parts, target, modes)
+        modes = climb_again(rng, target, found)
+        # A delay that stood in for something else leads away; the poses are the same ones on every clock.
+        if not modes.point.log_density.max() > found.point.log_density.max():
+            break
+        best = _Searched(motions, parts, target, modes)
+    return best
 
 
 def _observed(
