@@ -18,8 +18,9 @@ from pbrl_bringup.graph import free_domain, load_graph, running_graph, with_para
 from pbrl_bringup.processes import Programs
 from pbrl_control.ros.floor_conversions import odometry_from_msg
 
-FIRST, EVERY, LASTS = 8.0, 4.0, 1.5
-"""[s] of simulated time: of the first fault, from one to the next, and for which each lasts."""
+FIRST, EVERY, LASTS = 12.0, 4.0, 1.5
+"""[s] of simulated time: of the first fault, from one to the next, and for which each lasts. Until the first, a
+controller that compiles on a busy machine has begun to drive."""
 FAULTS = {
     "/cmd_vel": "lost: 1.0",
     "/joint_states": "lost: 1.0",

@@ -40,12 +40,12 @@ ENCODER_STEP = 2 * math.pi / (4000 * 15)
 
 BASE_ACCELERATION = (0.5, 1.0)
 """Most change of speed [m/s^2] and turning [rad/s^2]; an estimate."""
-BRAKING = (1.0, 2.2, 3.0)
+BRAKING = (1.0, 2.5, 4.0)
 """The same where a stop is commanded or commands have ceased: forwards, backwards, turning. In Bullet the slider lifts
 off the floor from 1.1 m/s^2 on when it drives forwards: it then rocks for longer than it would have rolled on."""
 BASE_SPEED = (0.35, 0.17, 0.5)
-"""Most that the base obeys: backwards, forwards [m/s], turning [rad/s]. From each it is at rest 0.3 s after the last
-command: the watchdog's 0.1 s, then `BRAKING`."""
+"""Most that the base obeys: backwards, forwards [m/s], turning [rad/s]. From each it is at rest 0.26 s after the
+last command, the watchdog's 0.1 s and then `BRAKING`: 0.04 s are left for a command that comes late."""
 JOINT_BRAKING = 2.0
 """By so much arms slow down faster than they speed up, where a stop is commanded or commands have ceased."""
 JOINT_ACCELERATION = np.radians([100.0, 100.0] + 2 * [100.0, 100.0, 95.0, 95.0, 100.0, 100.0, 200.0])
