@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
-from pbrl_mismatch.kernels.laws_kernel import roll_on, swivel
+from pbrl_mismatch.kernels.laws_kernel import FOOT, roll_on, swivel
 
 
 def test_a_caster_s_bearing_rubs_by_how_much_faster_than_the_body_its_fork_turns() -> None:
     # A body that turns about a point takes trailing forks along: their bearings do not move.
-    row, acc, omega, trail = neutral_row(), np.zeros(9), 0.4, 0.03
+    row, omega, trail = neutral_row(), 0.4, 0.03
     row[[COLUMN["caster_trail"], COLUMN["caster_scrub"]]] = trail, 0.05
     pivot, centre = np.array([0.3, -0.2]), np.array([1.1, 0.4])
     velocity = omega * np.array([-(pivot - centre)[1], (pivot - centre)[0]])
@@ -21,20 +21,18 @@ def test_a_caster_s_bearing_rubs_by_how_much_faster_than_the_body_its_fork_turns
     angle = math.asin(trail * omega / math.hypot(*velocity))
     heading = math.atan2(velocity[1], velocity[0]) - angle
     twist = np.array([*(velocity - omega * np.array([-pivot[1], pivot[0]])), omega])
-    roll_on(row, math.cos(heading), math.sin(heading), 100.0, *pivot, *velocity, omega, acc)
-    np.testing.assert_allclose(matrix_of(acc) @ twist, 0.0, atol=1e-9)
-    acc[:] = 0.0
-    roll_on(row, math.cos(heading + 0.5), math.sin(heading + 0.5), 100.0, *pivot, *velocity, omega, acc)
-    assert np.hypot(*(matrix_of(acc) @ twist)[:2]) == pytest.approx(5.0, rel=1e-3)
+    still = felt(row, math.cos(heading), math.sin(heading), twist, velocity)
+    np.testing.assert_allclose(still, 0.0, atol=1e-9)
+    rubbing = felt(row, math.cos(heading + 0.5), math.sin(heading + 0.5), twist, velocity)
+    assert np.hypot(*rubbing[:2]) == pytest.approx(5.0, rel=1e-3)
 
 
 @pytest.mark.parametrize(("angle", "share"), [(1.2, 1.0), (0.3, 0.5 * math.tan(0.3))])
 def test_a_tread_that_rolls_while_it_turns_is_twisted_less(angle: float, share: float) -> None:
-    row, acc = neutral_row(), np.zeros(9)
+    row = neutral_row()
     row[[COLUMN["caster_trail"], COLUMN["caster_twist"], COLUMN["caster_lay"]]] = 0.03, 0.05, 0.015
     velocity = 0.2 * np.array([math.cos(angle), math.sin(angle)])
-    roll_on(row, 1.0, 0.0, 100.0, 0.3, -0.2, *velocity, 0.0, acc)
-    force = matrix_of(acc) @ np.array([*velocity, 0.0])
+    force = felt(row, 1.0, 0.0, np.array([*velocity, 0.0]), velocity)
     np.testing.assert_allclose(force[:2], [0.0, 5.0 * min(share, 1.0)], atol=1e-2)
 
 
@@ -56,7 +54,10 @@ def test_a_caster_that_is_pulled_straight_backwards_turns_over() -> None:
     np.testing.assert_allclose(swivel(-1.0, 0.0, 1.0, 0.0, 20.0), (1.0, 0.0), atol=1e-4)
 
 
-def matrix_of(acc: np.ndarray) -> np.ndarray:
-    """Return the resistances of an account."""
+def felt(row: np.ndarray, ex: float, ey: float, twist: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """Return the wrench with which a caster under 100 N resists."""
+    acc, room = np.zeros(9), np.zeros((1, FOOT))
+    room[0, :6] = 0.3, -0.2, 0.0, 100.0, ex, ey
+    roll_on(row, room, 0, *velocity, twist[2], True, acc)
     xx, xy, yy, xt, yt, tt = acc[3:]
-    return np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
+    return np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]]) @ twist - acc[:3]

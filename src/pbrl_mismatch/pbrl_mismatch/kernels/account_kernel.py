@@ -3,7 +3,7 @@
 A law adds to an account `acc` (9,): force and torque (0..2) at the centre of mass in world axes, and the upper
 triangle xx, xy, yy, xt, yt, tt (3..8) of a matrix D of resistances, so that the wrench is acc[:3] - D (vx, vy, omega).
 Resistances are solved for implicitly, which keeps stiff springs and dry friction steady at any step: a spring adds
-its stiffness times dt, dry friction its limit over the sliding speed, taken from the iteration before.
+its stiffness times dt, dry friction what `friction_kernel` says.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP, SETTLING, push, resist
+from pbrl_mismatch.kernels.friction_kernel import bent, rub_along, rub_in_ellipse
 from pbrl_mismatch.kernels.own_kernel import how_many, own_laws
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
 from pbrl_model.kernel import GRAVITY
@@ -24,9 +25,11 @@ BORDER = 0.01
 """A patch's border is so soft [m]: a foot has a width, and a fit needs a slope."""
 BACKWARDS, TURNS_OVER = -1.0 + 1e-7, 4000.0
 """A caster whose turn has a cosine below this goes backwards, and still turns over: by so much of a tangent of half."""
-FOOT = 6
-"""Numbers of a foot that `lay_feet` writes: lever (x, y) [m], limit of its friction [N], load on it [N], cosine and
-sine of its caster's heading."""
+ROLLS, SCRUBS, TWISTS, RUBS = 6, 8, 10, 12
+FOOT = 16
+"""Numbers of a foot: lever (x, y) [m], limit of its friction [N], load on it [N], cosine and sine of its caster's
+heading, as `lay_feet` writes them; then what iterations keep of each friction, see `friction_kernel`. One more row is
+the second wheel's."""
 SWITCHING = 0.1
 """What begins at some moment comes on within this time [s]: a fit needs a slope."""
 
@@ -146,9 +149,7 @@ def on_casters(p: Array) -> bool:
 
 
 @njit(**LEAF, forceinline=True)
-def roll_on(
-    p: Array, ex: float, ey: float, load: float, rx: float, ry: float, ux: float, uy: float, omega: float, acc: Array
-) -> None:
+def roll_on(p: Array, room: Array, i: int, ux: float, uy: float, omega: float, fresh: bool, acc: Array) -> None:
     """Add what a trailing caster resists: the wheel's rolling, the tread's twist, and the bearing of the fork.
 
     The wheel rolls, so that the fork turns by the pivot's speed across over the trail. The bearing rubs by how much
@@ -157,26 +158,27 @@ def roll_on(
 
     Args:
         p: (WIDTH,) parameter row.
-        ex: cosine of the caster's heading, world axes.
-        ey: its sine.
-        load: on it [N].
-        rx: lever of its pivot from the centre of mass [m].
-        ry: as `rx`.
+        room: (n, FOOT), see `FOOT`.
+        i: row of its foot.
         ux: velocity of the pivot [m/s].
         uy: as `ux`.
         omega: of the body [rad/s].
+        fresh: see `friction_kernel.bent`.
         acc: (9,) account.
     """
-    trail = p[at.CASTER_TRAIL]
+    trail, rx, ry, load, ex, ey = p[at.CASTER_TRAIL], room[i, 0], room[i, 1], room[i, 3], room[i, 4], room[i, 5]
     along, across = ux * ex + uy * ey, uy * ex - ux * ey
-    resist(acc, rx, ry, ex, ey, p[at.CASTER_ROLL] * load / math.sqrt(along * along + CREEP * CREEP))
+    rub_along(acc, room, i, ROLLS, rx, ry, ex, ey, p[at.CASTER_ROLL] * load, along, fresh)
     if p[at.CASTER_SCRUB] > 0.0:
-        slip = across - trail * omega
-        k = p[at.CASTER_SCRUB] * load / math.sqrt(slip * slip + CREEP * CREEP)
-        resist(acc, rx - trail * ex, ry - trail * ey, -ey, ex, k)
+        slip, limit = across - trail * omega, p[at.CASTER_SCRUB] * load
+        rub_along(acc, room, i, SCRUBS, rx - trail * ex, ry - trail * ey, -ey, ex, limit, slip, fresh)
     if p[at.CASTER_TWIST] > 0.0:
-        slip = max(math.sqrt(across * across + CREEP * CREEP), abs(along) * trail / p[at.CASTER_LAY])
-        resist(acc, rx, ry, -ey, ex, p[at.CASTER_TWIST] * load / slip)
+        laid = abs(along) * trail / p[at.CASTER_LAY]
+        if laid * laid > across * across + CREEP * CREEP:
+            resist(acc, rx, ry, -ey, ex, p[at.CASTER_TWIST] * load / laid)
+            room[i, TWISTS], room[i, TWISTS + 1] = across, 0.0  # should an iteration find that it is laid down no more
+        else:
+            rub_along(acc, room, i, TWISTS, rx, ry, -ey, ex, p[at.CASTER_TWIST] * load, across, fresh)
 
 
 @njit(**LEAF, forceinline=True)
@@ -184,37 +186,6 @@ def dry(p: Array) -> bool:
     """Tell whether any dry friction of the effects is on: its limit depends on the velocity it leads to."""
     floor = p[at.SLIDE_MU] + p[at.BREAKAWAY_MU] + abs(p[at.PATCH_MU])
     return on_casters(p) or floor + p[at.WHEEL2_MU_X] + max(p[at.WHEEL2_MU_Y], 0.0) > 0.0
-
-
-@njit(**LEAF, forceinline=True)
-def drag_wheel(
-    c: float,
-    s: float,
-    vx: float,
-    vy: float,
-    omega: float,
-    ax: float,
-    ay: float,
-    wc: float,
-    ws: float,
-    along: float,
-    across: float,
-    acc: Array,
-) -> None:
-    """Add a wheel's dry friction: F = -D^2 u / sqrt(u^T D^2 u) with D = diag(along, across) [N] in the wheel's axes.
-
-    That is friction within an ellipse, against the motion where both limits are the same. `across` below zero: the
-    same as `along`.
-    """
-    across = along if across < 0.0 else across
-    rx, ry = c * ax - s * ay, s * ax + c * ay
-    ex, ey = c * wc - s * ws, s * wc + c * ws
-    ux, uy = vx - omega * ry, vy + omega * rx
-    first, second = along * (ux * ex + uy * ey), across * (uy * ex - ux * ey)
-    rest = CREEP * max(along, across)
-    scale = 1.0 / math.sqrt(first * first + second * second + rest * rest)
-    resist(acc, rx, ry, ex, ey, along * along * scale)
-    resist(acc, rx, ry, -ey, ex, across * across * scale)
 
 
 @njit(**LEAF)
@@ -269,7 +240,7 @@ def lay_feet(
         feet: (F, 2) points in the body's frame that share the load [m].
         axes: (7,) see `fixed_axes`.
         acc: (9,) account, of which the force tips the body.
-        room: (F, FOOT) written.
+        room: (F + 1, FOOT) of which the first six numbers of the feet are written.
     """
     count = feet.shape[0]
     even, ox, oy, gx, gy = mass * GRAVITY / count, 0.0, 0.0, 0.0, 0.0
@@ -300,6 +271,7 @@ def resistances(
     com: Array,
     axes: Array,
     room: Array,
+    fresh: bool,
     acc: Array,
 ) -> None:
     """Add dry friction at every foot and at the second wheel.
@@ -314,32 +286,41 @@ def resistances(
         mass: see `springs`.
         com: see `springs`.
         axes: (7,) see `fixed_axes`.
-        room: (F, FOOT) see `lay_feet`; not read where the feet do not resist.
+        room: (F + 1, FOOT), see `FOOT`.
+        fresh: see `friction_kernel.bent`.
         acc: (9,) account.
     """
     if on_feet(p):
         rolls, leaves = on_casters(p), p[at.BREAKAWAY_MU] > 0.0
-        straight, aside, ahead, turning = 0.0, 0.0, 0.0, 0.0
-        for i in range(room.shape[0]):
+        fx, fy, torque, xx, xy, yy, xt, yt, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(room.shape[0] - 1):
             rx, ry, limit, load = room[i, 0], room[i, 1], room[i, 2], room[i, 3]
             ux, uy = vx - omega * ry, vy + omega * rx
-            square = ux * ux + uy * uy
             if leaves:
-                limit += load * p[at.BREAKAWAY_MU] * math.exp(-square / p[at.BREAKAWAY_SPEED] ** 2)
-            k = limit / math.sqrt(square + CREEP * CREEP)
-            straight += k
-            aside -= k * ry
-            ahead += k * rx
-            turning += k * (rx * rx + ry * ry)
+                limit += load * p[at.BREAKAWAY_MU] * math.exp(-(ux * ux + uy * uy) / p[at.BREAKAWAY_SPEED] ** 2)
+            if limit > 0.0:
+                f, g, k, m, n = bent(room, i, RUBS, ux, uy, CREEP, fresh)
+                f, g, k, m, n = limit * f, limit * g, limit * k, limit * m, limit * n
+                first, second = m * rx - k * ry, n * rx - m * ry
+                fx, fy, torque = fx + f, fy + g, torque + rx * g - ry * f
+                xx, xy, yy, xt, yt = xx + k, xy + m, yy + n, xt + first, yt + second
+                tt += second * rx - first * ry
             if rolls and i < CASTERS:
-                roll_on(p, room[i, 4], room[i, 5], load, rx, ry, ux, uy, omega, acc)
-        acc[3] += straight
-        acc[5] += straight
-        acc[6] += aside
-        acc[7] += ahead
-        acc[8] += turning
-    weight = mass * GRAVITY
-    if p[at.WHEEL2_MU_X] > 0.0 or p[at.WHEEL2_MU_Y] > 0.0:
-        ax, ay = p[at.WHEEL2_X] - com[0], p[at.WHEEL2_Y] - com[1]
-        along, across = weight * p[at.WHEEL2_MU_X], weight * p[at.WHEEL2_MU_Y]
-        drag_wheel(c, s, vx, vy, omega, ax, ay, axes[2], axes[3], along, across, acc)
+                roll_on(p, room, i, ux, uy, omega, fresh, acc)
+        acc[0] -= fx
+        acc[1] -= fy
+        acc[2] -= torque
+        acc[3] += xx
+        acc[4] += xy
+        acc[5] += yy
+        acc[6] += xt
+        acc[7] += yt
+        acc[8] += tt
+    along, across = mass * GRAVITY * p[at.WHEEL2_MU_X], mass * GRAVITY * p[at.WHEEL2_MU_Y]
+    if along > 0.0 or across > 0.0:
+        # One limit alone is that in both axes.
+        across = along if across < 0.0 else across
+        ax, ay, wc, ws = p[at.WHEEL2_X] - com[0], p[at.WHEEL2_Y] - com[1], axes[2], axes[3]
+        rx, ry = c * ax - s * ay, s * ax + c * ay
+        ex, ey, ux, uy = c * wc - s * ws, s * wc + c * ws, vx - omega * ry, vy + omega * rx
+        rub_in_ellipse(acc, room, room.shape[0] - 1, RUBS, rx, ry, ex, ey, along, across, ux, uy, fresh)

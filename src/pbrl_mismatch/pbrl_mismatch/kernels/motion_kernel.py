@@ -113,7 +113,7 @@ def simulate_window(
     """
     state, com, acc, wrench = np.empty(STATE), np.empty(2), np.empty(9), np.empty(3)
     before, after, axes = np.empty(3), np.empty(3), np.empty(7)
-    room = np.empty((feet.shape[0], FOOT))
+    room = np.empty((feet.shape[0] + 1, FOOT))
     first, steps, dt = span[FIRST], span[STEPS], body[3]
     knots = extra.shape[0] - 1
     mass, inertia = load_now(p, clock[first], body, com)

@@ -62,7 +62,7 @@ def accelerate_along(
         out: (P, ceil(T / stride), 3) [m/s^2, m/s^2, rad/s^2], written.
     """
     state, com, acc, wrench = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3)
-    axes, room, dt = np.empty(7), np.empty((feet.shape[0], FOOT)), body[3]
+    axes, room, dt = np.empty(7), np.empty((feet.shape[0] + 1, FOOT)), body[3]
     for r in range(rows.shape[0]):
         p = rows[r]
         fixed_axes(p, REACTION, axes)

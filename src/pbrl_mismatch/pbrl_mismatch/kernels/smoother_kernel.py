@@ -114,7 +114,7 @@ def smooth_episode(
     _, _ = load_now(p, clock[first], body, com)
     to_truth(p, told, body, com, state)
     rehearse(p, seen, span, body, outline, feet, com, state)
-    axes, room = np.empty(7), np.empty((feet.shape[0], FOOT))
+    axes, room = np.empty(7), np.empty((feet.shape[0] + 1, FOOT))
     fixed_axes(p, dt, axes)
     kept = math.exp(-dt / memory)
     x, c = np.zeros(SIZE), np.zeros((SIZE, SIZE))
@@ -236,7 +236,7 @@ def pushes_along(
         out: (P, ceil(T / stride), 3) change of velocity over a step, over dt [m/s^2, m/s^2, rad/s^2].
     """
     state, com, acc, wrench, extra = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3), np.zeros(3)
-    axes, room = np.empty(7), np.empty((feet.shape[0], FOOT))
+    axes, room = np.empty(7), np.empty((feet.shape[0] + 1, FOOT))
     for r in range(rows.shape[0]):
         p = rows[r]
         fixed_axes(p, body[3], axes)

@@ -23,8 +23,9 @@ from pbrl_model.kernel import ERROR_BIAS, GRAVITY, SINGULAR, box_impulses, cos_s
 
 Array = NDArray[np.float64]
 
-SWEEPS, SAME = 12, 2e-5
-"""Times at most that dry friction is taken anew at the velocity it leads to; a change below this [m/s] ends it."""
+SWEEPS, SAME = 10, 3e-3
+"""Times at most that dry friction is linearised anew at the velocity it leads to; a change of the acceleration below
+this [m/s^2] ends it."""
 CONE_STEPS = 5
 """Newton steps to the edge of a friction ellipse."""
 
@@ -211,7 +212,7 @@ def respond(
         feet: see `step_body`.
         axes: see `step_body`.
         acc: (9,) account, see `laws_kernel`.
-        room: (F, FOOT), see `laws_kernel.lay_feet`.
+        room: (F + 1, FOOT), see `laws_kernel.lay_feet`.
         dt: in which that happens [s].
 
     Returns:
@@ -221,14 +222,18 @@ def respond(
     if dry(p):
         if on_feet(p):
             lay_feet(p, state, c, s, mass, com, feet, axes, acc, room)
-        b3, b4, b5, b6, b7, b8 = acc[3], acc[4], acc[5], acc[6], acc[7], acc[8]
-        for _ in range(SWEEPS):
-            acc[3], acc[4], acc[5], acc[6], acc[7], acc[8] = b3, b4, b5, b6, b7, b8
-            resistances(p, c, s, vx, vy, omega, mass, com, axes, room, acc)
+        b0, b1, b2, b3, b4, b5, b6, b7, b8 = acc[0], acc[1], acc[2], acc[3], acc[4], acc[5], acc[6], acc[7], acc[8]
+        fresh = True
+        for sweep in range(SWEEPS):
+            acc[0], acc[1], acc[2], acc[3], acc[4], acc[5], acc[6], acc[7], acc[8] = b0, b1, b2, b3, b4, b5, b6, b7, b8
+            resistances(p, c, s, vx, vy, omega, mass, com, axes, room, fresh, acc)
             ux, uy, turn = vx, vy, omega
             vx, vy, omega = solve_resisted(state, mass, inertia, acc, dt)
-            if abs(vx - ux) + abs(vy - uy) + abs(omega - turn) < SAME:
+            if abs(vx - ux) + abs(vy - uy) + abs(omega - turn) < SAME * dt:
                 break
+            fresh = sweep == 0 and mass * (vx * ux + vy * uy) + inertia * omega * turn < 0.0
+            if fresh:  # Friction of a slide turns it about: rather than that, it stands.
+                vx, vy, omega = 0.0, 0.0, 0.0
     else:
         vx, vy, omega = solve_resisted(state, mass, inertia, acc, dt)
     ax, ay, turned = (vx - state[3]) / dt, (vy - state[4]) / dt, (omega - state[5]) / dt
@@ -296,7 +301,7 @@ def step_body(
         feet: (F, 2) points that carry the load.
         axes: (7,) see `fixed_axes`.
         acc: (9,) written, see `account_kernel`.
-        room: (F, FOOT) written, see `laws_kernel.lay_feet`.
+        room: (F + 1, FOOT) written, see `laws_kernel.lay_feet`.
         dt: [s].
     """
     state[0] += state[3] * dt

@@ -94,7 +94,7 @@ def push_once(
     """Simulate one push under one parameter row, see `push_all`; its arguments without their first axes."""
     state, com, acc, force = np.empty(STATE), np.empty(2), np.empty(9), np.empty(3)
     axes, pose, before, felt = np.empty(7), np.empty(3), np.empty(3), np.empty(3)
-    room = np.empty((feet.shape[0], FOOT))
+    room = np.empty((feet.shape[0] + 1, FOOT))
     dt, segments = body[3], out.shape[0]
     steps = max(segments, round(duration / dt))
     mass, inertia = load_now(p, began, body, com)
