@@ -38,3 +38,22 @@ def test_discs_are_put_beside_the_contact_and_a_third_stays() -> None:
     np.testing.assert_allclose(placed[moved, :2].mean(0), [1.0, 2.1], atol=0.02)
     np.testing.assert_array_equal(placed[~moved], draws[~moved])
     np.testing.assert_array_equal(with_contacts(rng, draws, (0, 1, 2), np.empty((0, 2)), np.empty((0, 2))), draws)
+
+
+def test_half_of_the_places_of_what_is_pushed_along_are_where_it_was_met(
+    concealed_recording: Callable[..., Recording],
+) -> None:
+    track = track_of(concealed_recording("clean", 1), "table")
+    row = neutral_row()
+    row[COLUMN["mass"]] = 20.0
+    found = residual_wrench(track, row, size=1.0)
+    count = len(found.world)
+    found.world[:] = 0.0
+    met, left = count // 3, count // 3 + round(2.0 / track.dt)
+    found.state[:, :2] = np.linspace([0.0, 0.0], [1.0, 0.5], count)  # every place is another
+    found.state[:, 2] = 0.0
+    found.world[met:left] = [-80.0, 0.0, 0.0]
+    places, _ = contact_points(track, found, met=True)
+    begin = places[0]
+    assert np.mean(np.all(places == begin, axis=1)) == pytest.approx(0.5, abs=0.02)
+    assert begin[0] == pytest.approx(places[:, 0].min())

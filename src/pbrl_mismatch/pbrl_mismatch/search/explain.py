@@ -17,12 +17,11 @@ from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart_rows, judged
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
-from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
+from pbrl_mismatch.search.hypothesis import BELIEVED, BENT, Hypothesis
 from pbrl_mismatch.search.library import search_library, trace
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.ground import traced
 from pbrl_mismatch.search.path.pins import may_be_pinned
-from pbrl_mismatch.search.path.starts import BENT
 from pbrl_mismatch.search.predictive import predictive_test
 from pbrl_mismatch.search.weigh import Weighed, veto, weigh, worth_of_another
 

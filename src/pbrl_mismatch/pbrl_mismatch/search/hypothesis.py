@@ -21,6 +21,8 @@ OF_THE_BODY = frozenset({*KERNEL_COLUMNS, "inertia_factor", "delay"})
 """Columns of a baseline."""
 BELIEVED = frozenset({"mass", "inertia_factor", "delay", "sensor_turn", "com_x", "com_y"})
 """Columns of a baseline of which something is known beforehand."""
+BENT = BELIEVED | {"mu_x", "mu_y"}
+"""Columns of a ground that bend to what it lacks: half of the starts have them as they were believed to be."""
 SHARE = 1e-2
 """Of a prior's spread: friction is solved for only so exactly, and a finite difference must be well above that."""
 OF_A_WHEEL = 0.03, 2.0

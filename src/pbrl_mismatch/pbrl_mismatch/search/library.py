@@ -73,7 +73,7 @@ def search_library(
     longest = cut_windows(track, max(options.windows))
     grounds = [ground_of(each.hypothesis, each.peak.coordinates[0], longest, options.sensor_floor) for each in bases]
     for ground in grounds:
-        _ = ground.climbed, ground.first, ground.fine
+        _ = ground.climbed, ground.first, ground.fine, ground.believed
     jobs = [
         (name, variant, base, ground)
         for base, ground in zip(bases, grounds, strict=True)

@@ -17,20 +17,29 @@ Array = NDArray[np.float64]
 SURE = 2.0
 """A residual of so many standard deviations may be a contact."""
 MOST_TIMES = 400
+FREE = 0.3
+"""A touch begins where for so long there was none [s]."""
 SCATTER = 0.02
 """Draws lie so far from where the line says [m]."""
 
 
-def contact_points(track: Track, residual: ResidualWrench) -> tuple[Array, Array]:
-    """Return places in world (n, 2) [m] where something may have touched, and outward normals (n, 2), by significance.
+def contact_points(track: Track, residual: ResidualWrench, *, met: bool = False) -> tuple[Array, Array]:
+    """Return places in world (n, 2) [m] where something may have touched, and outward normals (n, 2).
 
     Args:
         track: with the outline.
         residual: what a model lacks.
+        met: half of the places are where a touch begins: what is pushed along from there was nowhere else before.
     """
     size = np.hypot(residual.world[:, 0], residual.world[:, 1])
-    rows = np.flatnonzero((residual.significance > SURE) & (size > 0.2 * size.max()))
+    touched = (residual.significance > SURE) & (size > 0.2 * size.max())
+    rows = np.flatnonzero(touched)
     rows = rows[:: max(1, len(rows) // MOST_TIMES)]
+    if met and len(rows):
+        before = np.concatenate([[0], np.cumsum(touched)])
+        since = np.maximum(np.arange(len(touched)) - round(FREE / track.dt), 0)
+        begins = np.flatnonzero(touched & (before[:-1] - before[since] == 0))
+        rows = np.concatenate([rows, np.resize(begins, len(rows))])
     places, normals = [], []
     com = track.body[1:3]
     for t in rows:

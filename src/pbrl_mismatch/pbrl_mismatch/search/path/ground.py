@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
 from pbrl_mismatch.kernels.columns import COLUMN
-from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
+from pbrl_mismatch.search.hypothesis import BENT, Hypothesis, step_sizes
 from pbrl_mismatch.search.path.along import Along, as_seen_path, lay_along
 from pbrl_mismatch.search.path.climb import climb_along, weights
 
@@ -65,6 +65,13 @@ class Ground:
     def row(self) -> Array:
         """Return (WIDTH,) its parameter row."""
         return self.hypothesis.rows(self.coordinates[None])[0]
+
+    @cached_property
+    def believed(self) -> ResidualWrench:
+        """Return what it would lack with mass and friction as was believed: what it lacks has bent them."""
+        bent = np.isin(self.hypothesis.columns, list(BENT))
+        row = self.hypothesis.rows(np.where(bent, self.hypothesis.mean, self.coordinates)[None])[0]
+        return residual_wrench(self.cuts.track, row)
 
     def along(self, stride: int) -> Along:
         """Return the windows along its path."""

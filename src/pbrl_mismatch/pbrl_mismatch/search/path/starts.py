@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_mismatch.data.residual import residual_wrench
+from pbrl_mismatch.data.residual import ResidualWrench
 from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.fitted import Fitted, apart, scene_of
-from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
+from pbrl_mismatch.search.hypothesis import BENT, Hypothesis
 from pbrl_mismatch.search.path.climb import PathPeak, climb_along
 from pbrl_mismatch.search.path.contacts import contact_points, with_contacts
 from pbrl_mismatch.search.path.ground import Ground
@@ -24,12 +24,11 @@ from pbrl_model.kernel import GRAVITY
 
 Array = NDArray[np.float64]
 
-BENT = BELIEVED | {"mu_x", "mu_y"}
-"""Columns of a ground that bend to what it lacks: half of the starts have them as they were believed to be."""
 FOUND = frozenset({"wheel_x", "wheel_y", "wheel_theta", "hinge_x", "hinge_y", "hinge_radius"})
 """Columns of a ground's kind that were hard to find."""
-PARENTS, NEARBY = 3, 0.15
-"""Of the draws of each half so many are drawn about again; how far, in standard deviations of the prior."""
+PARENTS, NEARBY = 3, (0.15, 0.04)
+"""Of the draws of each half so many are drawn about again; how far, in standard deviations of the prior: a second time
+what is met, or missed by a centimetre."""
 BEGUN, CLIMBED = 3, 5
 """Steps along the path of all starts of a hypothesis, and of the best of them."""
 
@@ -52,11 +51,11 @@ def starts_of(
     draws, afresh = _drawn(rng, hypothesis, effect, variant, base, ground, options)
     ranked, misfit = screen(ground, hypothesis, effect, draws)
     searched = _searched(effect, variant)
-    if searched:
-        # Edges in time and borders are met by few draws and felt from nearby only: the best ones are drawn about again.
+    # Edges in time and borders are met by few draws and felt from nearby only: the best ones are drawn about again.
+    for nearby in (NEARBY if effect.touches is not None else NEARBY[:1]) if searched else ():
         parents = np.concatenate([_first_of(misfit, half) for half in (~afresh, afresh)])
         parents = np.resize(parents, len(draws))
-        moved = np.isin(hypothesis.columns, searched) * NEARBY * hypothesis.spread
+        moved = np.isin(hypothesis.columns, searched) * nearby * hypothesis.spread
         near = hypothesis.believable(ranked[parents] + moved * rng.standard_normal((len(draws), len(moved))))
         again, rest = screen(ground, hypothesis, effect, near)
         ranked, misfit = np.concatenate([ranked, again]), np.concatenate([misfit, rest])
@@ -83,9 +82,11 @@ def _drawn(
     options: DiagnoseOptions,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return draws (n, K), and which of them have the ground's own columns as they were believed to be (n,)."""
-    track, lacks, columns, kept = ground.cuts.track, ground.lacks, hypothesis.columns, _kept()
+    track, columns, kept = ground.cuts.track, hypothesis.columns, _kept()
     count = max(options.draws * len(_searched(effect, variant)) // 3, 2)
-    draws = hypothesis.sample_prior(rng, max(count // 4, 8) if effect.remembers else count)
+    if effect.remembers and effect.touches is None:
+        count = max(count // 4, 8)  # each costs twice as much, and its place is not to be found
+    draws = hypothesis.sample_prior(rng, count)
     afresh = np.arange(len(draws)) % 2 == 1
     for k, column in enumerate(columns):
         if column in base.hypothesis.columns:
@@ -95,26 +96,16 @@ def _drawn(
                 hypothesis.mean[k] if column in BENT else draws[:, k],
                 ground.coordinates[base.hypothesis.columns.index(column)],
             )
-    if effect.touches is not None:
-        x, y, radius = (columns.index(column) for column in effect.touches)
-        draws = with_contacts(rng, draws, (x, y, radius), *contact_points(track, lacks))
-    if effect.pulls:
-        x, y, *at = (columns.index(name) for name in effect.pulls if name in columns)
-        point = (at[0], at[1]) if at else None
-        cord = columns.index(effect.cord) if effect.cord else None
-        draws = with_pulls(rng, draws, (x, y), point, cord, track, lacks)
+    for half, lacks in ((~afresh, ground.lacks), (afresh, ground.believed)):
+        draws[half] = _placed(rng, draws[half], columns, effect, lacks, base, ground)
     if effect.second and "wheel_x" in columns:
         draws = with_splits(rng, draws, columns, scene_of(track, base.row).size)
     if effect.pins is not None:
         draws = with_pins(rng, draws, (columns.index(effect.pins[0]), columns.index(effect.pins[1])), track)
     if effect.region is not None:
         x, y, length, width, angle = (columns.index(column) for column in effect.region)
-        as_believed = residual_wrench(track, _believed_row(base, ground))
-        tiles = tile_friction(track, as_believed, GRAVITY * scene_of(track, base.row).mass)
+        tiles = tile_friction(track, ground.believed, GRAVITY * scene_of(track, base.row).mass)
         draws = with_regions(rng, draws, (x, y, length, width, angle), *tiles)
-    if effect.rhythm is not None and effect.rhythm[0] in columns:
-        frequency, phase = (columns.index(name) for name in effect.rhythm)
-        draws = with_rhythms(rng, draws, frequency, phase, lacks, track.gyration)
     return draws, afresh
 
 
@@ -128,10 +119,29 @@ def _kept() -> frozenset[str]:
     return FOUND.union(places) - BENT
 
 
-def _believed_row(base: Fitted, ground: Ground) -> Array:
-    """Return the row (WIDTH,) of a ground as it is fitted, but with mass and friction as was believed."""
-    bent = np.isin(base.hypothesis.columns, list(BENT))
-    return base.hypothesis.rows(np.where(bent, base.hypothesis.mean, ground.coordinates)[None])[0]
+def _placed(
+    rng: np.random.Generator,
+    draws: Array,
+    columns: tuple[str, ...],
+    effect: Effect,
+    lacks: ResidualWrench,
+    base: Fitted,
+    ground: Ground,
+) -> Array:
+    """Return draws (n, K) of which some are put where and when a lacking wrench says that an effect acts."""
+    track = ground.cuts.track
+    if effect.touches is not None:
+        x, y, radius = (columns.index(column) for column in effect.touches)
+        draws = with_contacts(rng, draws, (x, y, radius), *contact_points(track, lacks, met=effect.remembers))
+    if effect.pulls:
+        x, y, *at = (columns.index(name) for name in effect.pulls if name in columns)
+        point = (at[0], at[1]) if at else None
+        cord = columns.index(effect.cord) if effect.cord else None
+        draws = with_pulls(rng, draws, (x, y), point, cord, track, lacks)
+    if effect.rhythm is not None and effect.rhythm[0] in columns:
+        frequency, phase = (columns.index(name) for name in effect.rhythm)
+        draws = with_rhythms(rng, draws, frequency, phase, lacks, track.gyration)
+    return draws
 
 
 def _first_of(misfit: Array, among: NDArray[np.bool_]) -> NDArray[np.int64]:
