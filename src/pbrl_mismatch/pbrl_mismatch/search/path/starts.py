@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_mismatch.data.residual import ResidualWrench
+from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
@@ -97,7 +98,7 @@ def _drawn(
                 ground.coordinates[base.hypothesis.columns.index(column)],
             )
     for half, lacks in ((~afresh, ground.lacks), (afresh, ground.believed)):
-        draws[half] = _placed(rng, draws[half], columns, effect, lacks, base, ground)
+        draws[half] = _placed(rng, draws[half], columns, effect, track, lacks)
     if effect.second and "wheel_x" in columns:
         draws = with_splits(rng, draws, columns, scene_of(track, base.row).size)
     if effect.pins is not None:
@@ -124,12 +125,10 @@ def _placed(
     draws: Array,
     columns: tuple[str, ...],
     effect: Effect,
+    track: Track,
     lacks: ResidualWrench,
-    base: Fitted,
-    ground: Ground,
 ) -> Array:
     """Return draws (n, K) of which some are put where and when a lacking wrench says that an effect acts."""
-    track = ground.cuts.track
     if effect.touches is not None:
         x, y, radius = (columns.index(column) for column in effect.touches)
         draws = with_contacts(rng, draws, (x, y, radius), *contact_points(track, lacks, met=effect.remembers))
