@@ -40,16 +40,3 @@ def resist(acc: Array, rx: float, ry: float, nx: float, ny: float, k: float) -> 
     acc[6] += k * nx * lever
     acc[7] += k * ny * lever
     acc[8] += k * lever * lever
-
-
-@njit(**LEAF, forceinline=True)
-def oppose(acc: Array, rx: float, ry: float, fx: float, fy: float, xx: float, xy: float, yy: float) -> None:
-    """Add a force against the motion u of the lever's end: (fx, fy) [N] and a resistance (xx, xy; xy, yy) u [N s/m]."""
-    push(acc, rx, ry, -fx, -fy)
-    xt, yt = xy * rx - xx * ry, yy * rx - xy * ry
-    acc[3] += xx
-    acc[4] += xy
-    acc[5] += yy
-    acc[6] += xt
-    acc[7] += yt
-    acc[8] += yt * rx - xt * ry

@@ -18,7 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_bag.kernel_options import LEAF
-from pbrl_mismatch.kernels.account_kernel import CREEP, oppose, push, resist
+from pbrl_mismatch.kernels.account_kernel import CREEP, push, resist
 
 Array = NDArray[np.float64]
 
@@ -131,13 +131,16 @@ def rub_in_ellipse(
     f, g, xx, xy, yy = bent(room, i, k, a, b, CREEP * max(along, across), fresh)
     f, g, xx, xy, yy = along * f, across * g, along * along * xx, along * across * xy, across * across * yy
     mixed = 2.0 * xy * ex * ey
-    oppose(
-        acc,
-        rx,
-        ry,
-        f * ex - g * ey,
-        f * ey + g * ex,
+    push(acc, rx, ry, g * ey - f * ex, -f * ey - g * ex)
+    xx, xy, yy = (
         xx * ex * ex - mixed + yy * ey * ey,
         (xx - yy) * ex * ey + xy * (ex * ex - ey * ey),
         xx * ey * ey + mixed + yy * ex * ex,
     )
+    xt, yt = xy * rx - xx * ry, yy * rx - xy * ry
+    acc[3] += xx
+    acc[4] += xy
+    acc[5] += yy
+    acc[6] += xt
+    acc[7] += yt
+    acc[8] += yt * rx - xt * ry
