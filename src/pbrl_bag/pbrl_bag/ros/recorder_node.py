@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import fnmatch
+import math
 import sys
+import threading
 import time
+from dataclasses import dataclass
 from datetime import datetime
-from functools import partial
+from operator import itemgetter
 
 import rclpy
+from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
@@ -21,11 +25,46 @@ from pbrl_bag.qos import Qos
 from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
-from pbrl_bag.ros.stopping import init_until_signal, spin_until
+from pbrl_bag.ros.stopping import init_until_signal
 from pbrl_bag.writer import BagWriter
 
 DISCOVERY_SECONDS = 0.2
 NOT_RECORDED = ["/parameter_events"]
+LISTENS, ATTENDS = 0.005, 0.05
+"""What has arrived is written every so often, and timers and requests are looked after every so often [s]."""
+
+
+class Unattended(CallbackGroup):
+    """Subscriptions of which an executor takes no notice: their messages are taken without it.
+
+    To wait anew, after each message, for all that may come is two thirds of what recording costs.
+    """
+
+    def can_execute(self, entity: object) -> bool:
+        """Return no."""
+        return False
+
+    def beginning_execution(self, entity: object) -> bool:
+        """Return no."""
+        return False
+
+    def ending_execution(self, entity: object) -> None:
+        """Do nothing: none has begun."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A topic that is recorded.
+
+    Attributes:
+        type_name: of its messages.
+        subscription: whose messages wait in the middleware.
+        profile: asked for.
+    """
+
+    type_name: str
+    subscription: Subscription
+    profile: QoSProfile
 
 
 class RecorderNode(Node):
@@ -49,7 +88,8 @@ class RecorderNode(Node):
         refuse_unknown(self)
         self.output: str = output or datetime.now().strftime("recording_%Y_%m_%d-%H_%M_%S")
         self.writer = BagWriter(self.output)
-        self._heard: dict[str, tuple[Subscription, QoSProfile]] = {}
+        self._heard: dict[str, Heard] = {}
+        self._unattended = Unattended()
         self._refused: set[str] = set()
         self._global = {self.resolve_topic_name(name) for name in GLOBAL}
         self._sim_time = bool(self.get_parameter("use_sim_time").value)
@@ -91,7 +131,7 @@ class RecorderNode(Node):
         """Subscribe to one topic so that all of its publishers are heard."""
         profile = profile_that_hears(offered)
         known = self._heard.get(topic)
-        if known and (known[1].reliability, known[1].durability) == (profile.reliability, profile.durability):
+        if known and _asks(known.profile) == _asks(profile):
             return
         try:
             if len(types) > 1:
@@ -103,22 +143,53 @@ class RecorderNode(Node):
             self.get_logger().warning(f"{topic} is not recorded: {error}")
             return
         if known:
-            self.destroy_subscription(known[0])
-        callback = partial(self._record, topic, types[0])
-        subscription = self.create_subscription(kind, topic, lambda data, info: callback(data, info), profile, raw=True)
-        self._heard[topic] = (subscription, profile)
+            self.destroy_subscription(known.subscription)
+        subscription = self.create_subscription(
+            kind, topic, lambda _: None, profile, callback_group=self._unattended, raw=True
+        )
+        self._heard[topic] = Heard(types[0], subscription, profile)
 
-    def _record(self, topic: str, type_name: str, data: bytes, info: dict[str, int]) -> None:
-        """Write one message as it came."""
-        now = self.get_clock().now().nanoseconds if self._sim_time else time.time_ns()
-        self.writer.write(topic, type_name, bytes(data), now, info.get("source_timestamp") or now)
+    def listen(self, stop: threading.Event) -> None:
+        """Write what arrives until an event is set, or ROS is shut down.
+
+        Raises:
+            BagError: it cannot be written.
+        """
+        executor = SingleThreadedExecutor()
+        executor.add_node(self)
+        attended = -math.inf
+        try:
+            while rclpy.ok() and not stop.is_set():
+                self.drain()
+                if self._sim_time or time.monotonic() > attended + ATTENDS:  # where the time is a message as well
+                    executor.spin_once(timeout_sec=0.0)
+                    attended = time.monotonic()
+                time.sleep(LISTENS)
+        finally:
+            executor.remove_node(self)
+            executor.shutdown()
 
     def drain(self) -> None:
-        """Write what has arrived and waits in the middleware, so that a stop loses nothing heard before it."""
-        for subscription, _ in self._heard.values():
-            with subscription.handle:
-                while (taken := subscription.handle.take_message(subscription.msg_type, True)) is not None:
-                    subscription.callback(*taken)
+        """Write what has arrived and waits in the middleware, in the order in which it was sent.
+
+        Raises:
+            BagError: it cannot be written.
+        """
+        arrived: list[tuple[int, str, bytes]] = []
+        for topic, heard in self._heard.items():
+            waiting = heard.subscription.handle
+            with waiting:
+                while (taken := waiting.take_message(heard.subscription.msg_type, True)) is not None:
+                    data, info = taken
+                    arrived.append((info.get("source_timestamp") or 0, topic, bytes(data)))
+        for sent, topic, data in sorted(arrived, key=itemgetter(0)):
+            now = self.get_clock().now().nanoseconds if self._sim_time else time.time_ns()
+            self.writer.write(topic, self._heard[topic].type_name, data, now, sent or now)
+
+
+def _asks(profile: QoSProfile) -> tuple[object, object]:
+    """Return what of a profile decides whom it hears."""
+    return profile.reliability, profile.durability
 
 
 def main() -> None:
@@ -127,7 +198,7 @@ def main() -> None:
     try:
         stop = init_until_signal()
         node = RecorderNode()
-        spin_until(node, stop.is_set)
+        node.listen(stop)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except BagError as error:

@@ -207,6 +207,8 @@ def _goes_on(life: Life, case: Case, state: State | None, told: int) -> tuple[st
 def lost_of(life: Life, frozen: Sequence[tuple[float, float]]) -> tuple[float, float]:
     """Return the longest stretch that a recording of a graph lacks though its simulator ran, and `Outcome.found` [s].
 
+    What counts is when a message was sent: one that was sent while the recorder was behind is late, and not lost.
+
     Args:
         life: the graph, ended.
         frozen: from when to when a recorder or simulator was frozen or away [s of the wall clock].
@@ -215,7 +217,7 @@ def lost_of(life: Life, frozen: Sequence[tuple[float, float]]) -> tuple[float, f
     lost, found = 0.0, 0.0
     for bag, begun, ended in life.bags:
         try:
-            heard = _times(bag)
+            heard = _sent(bag)
         except BagError:
             return NEVER, NEVER
         for truth in walls:
@@ -232,15 +234,16 @@ def _met(truth: Array, heard: Array) -> float:
     return float(heard[after]) if after < len(heard) and heard[after] <= truth[-1] else math.inf
 
 
-def _times(bag: Path) -> Array:
+def _sent(bag: Path) -> Array:
+    """Return when the simulator sent what a recording has of it, by the wall clock [s]."""
     file = McapFile(next(iter(bag.glob("*.mcap")), bag))
-    return np.sort([message.log_time / 1e9 for message in file.messages() if message.topic == WATCHED_TOPIC])
+    return np.sort([message.publish_time / 1e9 for message in file.messages() if message.topic == WATCHED_TOPIC])
 
 
 def _missing(truth: Array, heard: Array, frozen: Sequence[tuple[float, float]]) -> float:
-    """Return how far a moment at which the simulator ran is from the next that was heard, at most [s]."""
+    """Return how far a moment at which the simulator ran is from the next that is recorded, at most [s]."""
     for begin, end in frozen:
-        truth = truth[(truth < begin) | (truth > end + 1.0)]  # what had piled up is read first
+        truth = truth[(truth < begin) | (truth > end)]
     if not len(truth):
         return 0.0
     if not len(heard):
