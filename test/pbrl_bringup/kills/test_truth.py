@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pbrl_bringup.kills.striking import NEVER, _met, _missing
+from pbrl_bag.writer import BagWriter
+from pbrl_bringup.kills.striking import NEVER, WATCHED_TOPIC, _met, _missing, _sent
 from pbrl_bringup.kills.truth import ROW, moves, read_truth, time_to_rest
 
 DT = 0.01
@@ -58,9 +59,20 @@ def test_what_is_missing_is_the_longest_stretch_but_for_what_was_frozen() -> Non
     heard = truth[(truth < 4.0) | ((truth > 6.0) & (truth < 12.0))]
     assert _missing(truth, heard, []) == pytest.approx(8.0, abs=0.05)
     assert _missing(truth[truth < 12.0], heard, []) == pytest.approx(1.0, abs=0.05), "to the nearest that was heard"
-    assert _missing(truth[truth < 12.0], heard, [(4.0, 5.5)]) < 0.05
+    assert _missing(truth[truth < 12.0], heard, [(4.0, 6.0)]) < 0.05
+    assert _missing(truth[truth < 12.0], heard, [(4.0, 5.5)]) == pytest.approx(0.5), "who is back has to hear again"
     assert _missing(truth, heard[:0], []) == NEVER
     assert _missing(truth[:0], heard, []) == 0.0
+
+
+def test_what_a_recorder_wrote_late_is_not_lost(tmp_path: Path) -> None:
+    bag, sent = tmp_path / "bag", np.arange(10.0, 12.0, 0.01)
+    writer = BagWriter(bag, live=False)
+    for when in sent:
+        written = int(max(when, 11.5) * 1e9)  # it was frozen, and then wrote all of it at once
+        writer.write(WATCHED_TOPIC, "sensor_msgs/msg/JointState", b"\x00\x01\x00\x00", written, int(when * 1e9))
+    writer.close()
+    assert _missing(sent, _sent(bag), []) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_who_has_just_started_has_to_be_found_first() -> None:

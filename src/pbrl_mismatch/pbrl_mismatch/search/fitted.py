@@ -24,6 +24,7 @@ from pbrl_mismatch.search.path.ground import FINE, Traced, traced_score
 from pbrl_model.fitting.guesses import axle, circle, pivot
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 BASELINE_STARTS, BASELINE_STEPS, KEPT_OF_BASELINE = 20, 6, 4
 """A baseline is climbed along the path from so many starts, in so many steps; so many go on to windows."""
@@ -45,12 +46,15 @@ class Split:
         scored: windows that are held out.
         both: those and the kept.
         told: the same time in windows of one block's length, whose errors are told.
+        is_kept, is_scored: (W,) of all windows of this length.
     """
 
     kept: Cuts
     scored: Cuts
     both: Cuts
     told: Cuts
+    is_kept: Mask
+    is_scored: Mask
 
 
 @dataclass(frozen=True)
@@ -155,7 +159,8 @@ def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:
         out, within, touched = inside(longest, blocks), inside(cuts, blocks), touching(cuts, blocks)
         if not (out.any() and within.any()) or touched.all():
             return Stages(fitted, ())
-        splits.append(Split(cuts.take(~touched), cuts.take(within), cuts.take(within | ~touched), longest.take(out)))
+        kept, scored, both = cuts.take(~touched), cuts.take(within), cuts.take(within | ~touched)
+        splits.append(Split(kept, scored, both, longest.take(out), ~touched, within))
     return Stages(fitted, tuple(splits))
 
 
@@ -277,15 +282,25 @@ def judged(fitted: Fitted, stages: Stages, options: DiagnoseOptions, *, even: bo
     starts = [fitted.peak.coordinates[0]] + ([fitted.short] if fitted.short is not None else [])
     if fitted.traced is not None and len(fitted.traced.coordinates) == len(starts[0]):
         starts.append(fitted.traced.coordinates)
-    objective = Objective(fitted.hypothesis, stages.split.kept, options.sensor_floor, even)
-    peak = climb(objective, np.array(starts), iterations=options.iterations[-1])
-    score = held_out_score(peak, peak.best, stages.split.scored, stages.split.told)
+    split, begun = stages.split, fitted.peak.nuisance[:1]
+    objective = Objective(fitted.hypothesis, split.kept, options.sensor_floor, even)
+    # Where a contact is met or missed by how a window begins, no climb leads from the one to the other.
+    at_rest = objective.at_rest(len(starts))
+    begins = np.concatenate([at_rest, at_rest + begun[:, split.is_kept]])
+    peak = climb(objective, np.array(starts * 2), begins, iterations=options.iterations[-1])
+    best = alone(peak)
+    score = held_out_score(best, 0, split.scored, split.told, begun[:, split.is_scored])
     # Given the kept windows, the others are as likely as all over the kept: the same number by another way.
+    begins = begun.repeat(2, axis=0)
+    begins[:, split.is_kept], begins[0, split.is_scored] = best.nuisance, 0.0
     whole = climb(
-        replace(objective, cuts=stages.split.both), peak.take(np.array([peak.best])).coordinates, iterations=WHOLE
+        replace(objective, cuts=split.both),
+        best.coordinates.repeat(2, axis=0),
+        begins[:, split.is_kept | split.is_scored],
+        iterations=WHOLE,
     )
-    others = [float(whole.evidence[0] - peak.evidence[peak.best])]
+    others = [float(whole.evidence.max() - best.evidence[0])]
     if fitted.traced is not None:
-        others.append(traced_score(fitted.traced, stages.split.kept, stages.split.both, options.sensor_floor))
+        others.append(traced_score(fitted.traced, split.kept, split.both, options.sensor_floor))
     score = replace(score, log_score=max(score.log_score, *others))
     return replace(fitted, score=score)

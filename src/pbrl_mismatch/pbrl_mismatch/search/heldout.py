@@ -39,16 +39,24 @@ class Score:
     rmse_retold: float
 
 
-def settle(objective: Objective, coordinates: Array) -> Array:
-    """Return the most likely nuisances (1, W, NUISANCES) at coordinates (1, K)."""
-    z = objective.at_rest(1)
+def settle(objective: Objective, coordinates: Array, begun: Array | None = None) -> Array:
+    """Return the most likely nuisances (1, W, NUISANCES) at coordinates (1, K).
+
+    Args:
+        objective: hypothesis and windows.
+        coordinates: where.
+        begun: nuisances from which each window is settled as well as from rest; the better one counts.
+    """
+    starts = objective.at_rest(1) if begun is None else np.concatenate([objective.at_rest(1), begun])
+    z, u = starts, coordinates.repeat(len(starts), axis=0)
     for _ in range(SETTLING_ROUNDS):
-        linear = objective.linearise(coordinates, z)
-        z, _, _ = settled(objective, coordinates, z, linear.spread, linear.residual)
-    return z
+        linear = objective.linearise(u, z)
+        z, _, misfit = settled(objective, u, z, linear.spread, linear.residual)
+    best = np.argmin(misfit, axis=0)
+    return z[best, np.arange(z.shape[1])][None]
 
 
-def held_out_score(peak: Peak, row: int, cuts: Cuts, told: Cuts | None = None) -> Score:
+def held_out_score(peak: Peak, row: int, cuts: Cuts, told: Cuts | None = None, begun: Array | None = None) -> Score:
     """Predict held-out windows.
 
     The parameters' Gaussian posterior is carried through. With its covariance C, the windows' reduced matrices H and
@@ -60,10 +68,11 @@ def held_out_score(peak: Peak, row: int, cuts: Cuts, told: Cuts | None = None) -
         row: which of its points.
         cuts: held-out windows of the fit's length, which are scored.
         told: longer ones over the same time, whose errors are told; None: the same.
+        begun: (1, W, NUISANCES) of the held-out windows, from which they are settled as well as from rest.
     """
     objective = replace(peak.objective, cuts=cuts)
     u = peak.coordinates[row : row + 1]
-    z = settle(objective, u)
+    z = settle(objective, u, begun)
     linear = objective.linearise(u, z)
     reduced = reduce(linear, z)
     misfit = objective.misfit(linear.residual, z)[0]
