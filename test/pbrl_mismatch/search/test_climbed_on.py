@@ -19,6 +19,7 @@ from pbrl_mismatch.search.fitted import Fitted, Stages, alone, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.objective import Objective
+from pbrl_mismatch.search.weigh import Weighed
 
 FLOOR = 0.15
 
@@ -56,19 +57,37 @@ def with_effects(fitted: Fitted, *effects: str) -> Fitted:
     return replace(fitted, hypothesis=replace(fitted.hypothesis, effects=effects))
 
 
+def in_order(*fitted: Fitted) -> tuple[Weighed, ...]:
+    return tuple(Weighed(each.hypothesis.effects, each, -float(k), 0.0, False) for k, each in enumerate(fitted))
+
+
 def test_parts_of_a_set_are_led_to_where_it_has_them_and_nothing_else_is(fitted: Any) -> None:
     sloped = fitted[1]
     stages, options = Stages((sloped.peak.objective.cuts,), ()), DiagnoseOptions()
     began = sloped.hypothesis.mean[None]
     short = replace(sloped, peak=climb(sloped.peak.objective, began, iterations=0))
     other = with_effects(short, "detent")
-    led = _parts_led(with_effects(sloped, "floor_slope", "time_offset"), [short, other], stages, options)
+    weighed = in_order(with_effects(sloped, "floor_slope", "time_offset"))
+    led = _parts_led(weighed, [short, other], stages, options)
     assert led[0].evidence >= sloped.evidence - 1e-6 > short.evidence
     assert led[1] is other
+
+
+def test_the_next_likeliest_set_leads_where_the_likeliest_is_at_another_top(fitted: Any) -> None:
+    sloped = fitted[1]
+    stages, options = Stages((sloped.peak.objective.cuts,), ()), DiagnoseOptions(iterations=(2, 2))
+    short = replace(sloped, peak=climb(sloped.peak.objective, sloped.hypothesis.mean[None], iterations=0))
+    stuck = with_effects(short, "floor_slope", "time_offset")
+    found = with_effects(sloped, "floor_slope", "detent")
+    alone, with_next = (
+        _parts_led(in_order(stuck, *next_one), [short], stages, options)[0] for next_one in ([], [found])
+    )
+    assert with_next.evidence >= max(alone.evidence, sloped.evidence) - 1e-6
 
 
 def test_a_hold_that_gives_way_leads_nothing(fitted: Any) -> None:
     sloped = fitted[1]
     stages, options = Stages((sloped.peak.objective.cuts,), ()), DiagnoseOptions()
     tried = [sloped, with_effects(sloped, GRASP_COMPLIANCE)]
-    assert _parts_led(with_effects(sloped, "floor_slope", GRASP_COMPLIANCE), tried, stages, options) is tried
+    weighed = in_order(with_effects(sloped, "floor_slope", GRASP_COMPLIANCE))
+    assert _parts_led(weighed, tried, stages, options) is tried

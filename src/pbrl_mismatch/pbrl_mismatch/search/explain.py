@@ -41,7 +41,8 @@ TRIED_OUT, GO_ON = 4, 4
 EXPLAINS = 10.0
 """What is likelier than the baseline by more explains something [nat]."""
 LEADS = 3
-"""So many of the likeliest effects lead a baseline to where they have the body's own parameters."""
+"""So many of the likeliest effects lead a baseline to where they have the body's own parameters, and of the likeliest
+sets their parts."""
 LED = 100.0
 """Kinds of baseline that are worse than the best by more [nat] are not led: no other top would do. Nor are effects
 tried on richer kinds than the best that are."""
@@ -127,25 +128,34 @@ def explain(
         likely = tuple(each for each in weigh(bases, [*tried, *more], options) if len(each.effects) != depth)
         tried += [beside_motion(each, grip) for each in _polished(likely, more, stages, options, POLISHED_OF_SETS)]
         weighed = weigh(bases, tried, options)
-    tried = [beside_motion(each, grip) for each in _parts_led(weighed[0].fitted, tried, stages, options)]
+    tried = [beside_motion(each, grip) for each in _parts_led(weighed, tried, stages, options)]
     return Explained(weigh(bases, tried, options), bases, stages, odds)
 
 
-def _parts_led(best: Fitted, tried: list[Fitted], stages: Stages, options: DiagnoseOptions) -> list[Fitted]:
-    """Return what was tried, the parts of the likeliest set climbed on from where the set has them.
+def _parts_led(
+    weighed: tuple[Weighed, ...], tried: list[Fitted], stages: Stages, options: DiagnoseOptions
+) -> list[Fitted]:
+    """Return what was tried, the parts of the likeliest set climbed on from where likely sets have them.
 
-    An effect of which there is nothing may have done no more than lead the others to a better top; not a hold that
-    gives way, which is laid on a top as it is and learned beside the motion.
+    An effect of which there is nothing may have done no more than lead the others to a better top; in the likeliest set
+    to one, in the next likeliest to another. That is not so of a hold that gives way, which is laid on a top as it is
+    and learned beside the motion.
     """
-    effects = set(best.hypothesis.effects) - {GRASP_COMPLIANCE}
-    if len(effects) < len(best.hypothesis.effects):
+    if GRASP_COMPLIANCE in weighed[0].effects:
         return tried
-    return [
-        _climbed_on(each, best, stages, options)
-        if each.hypothesis.effects and set(each.hypothesis.effects) < effects
-        else each
-        for each in tried
-    ]
+    sets = [each.fitted for each in weighed if GRASP_COMPLIANCE not in each.effects]
+
+    def led_on(part: Fitted) -> Fitted:
+        leaders = [each for each in sets if set(part.hypothesis.effects) < set(each.hypothesis.effects)]
+        for leader in leaders[:LEADS]:
+            part = _climbed_on(part, leader, stages, options)
+        return part
+
+    whole = set(weighed[0].effects)
+    parts = [each for each in tried if each.hypothesis.effects and set(each.hypothesis.effects) < whole]
+    with ThreadPoolExecutor(options.workers) as pool:
+        better = dict(zip(map(id, parts), pool.map(led_on, parts), strict=True))
+    return [better.get(id(each), each) for each in tried]
 
 
 def _grounds_of_sets(weighed: tuple[Weighed, ...], depth: int, track: Track, lacks: bool) -> list[Fitted]:
