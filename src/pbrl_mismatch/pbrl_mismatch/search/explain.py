@@ -41,8 +41,8 @@ TRIED_OUT, GO_ON = 4, 4
 EXPLAINS = 10.0
 """What is likelier than the baseline by more explains something [nat]."""
 LEADS = 3
-"""So many of the likeliest effects lead a baseline to where they have the body's own parameters, and of the likeliest
-sets their parts."""
+"""So many of the likeliest effects lead a baseline to where they have the body's own parameters, and so many of the
+sets that explain most lead their parts."""
 LED = 100.0
 """Kinds of baseline that are worse than the best by more [nat] are not led: no other top would do. Nor are effects
 tried on richer kinds than the best that are."""
@@ -135,27 +135,22 @@ def explain(
 def _parts_led(
     weighed: tuple[Weighed, ...], tried: list[Fitted], stages: Stages, options: DiagnoseOptions
 ) -> list[Fitted]:
-    """Return what was tried, the parts of the likeliest set climbed on from where likely sets have them.
+    """Return what was tried, the parts of the sets that explain most climbed on from where those have them.
 
-    An effect of which there is nothing may have done no more than lead the others to a better top; in the likeliest set
-    to one, in the next likeliest to another. That is not so of a hold that gives way, which is laid on a top as it is
-    and learned beside the motion.
+    An effect of which there is nothing may have done no more than lead another to a better top: alone that does as well
+    there. A hold that gives way leads nothing: it is laid on a top as it is and learned beside the motion.
     """
-    if GRASP_COMPLIANCE in weighed[0].effects:
-        return tried
-    sets = [each.fitted for each in weighed if GRASP_COMPLIANCE not in each.effects]
+    sets = [each.fitted for each in weighed if len(each.effects) > 1 and GRASP_COMPLIANCE not in each.effects]
+    sets = sorted(sets, key=_lowest)[:LEADS]
 
     def led_on(part: Fitted) -> Fitted:
-        leaders = [each for each in sets if set(part.hypothesis.effects) < set(each.hypothesis.effects)]
-        for leader in leaders[:LEADS]:
-            part = _climbed_on(part, leader, stages, options)
+        wholes = [each for each in sets if set(part.hypothesis.effects) < set(each.hypothesis.effects)]
+        for whole in [each for each in wholes if each.evidence > part.evidence]:
+            part = _climbed_on(part, whole, stages, options)
         return part
 
-    whole = set(weighed[0].effects)
-    parts = [each for each in tried if each.hypothesis.effects and set(each.hypothesis.effects) < whole]
     with ThreadPoolExecutor(options.workers) as pool:
-        better = dict(zip(map(id, parts), pool.map(led_on, parts), strict=True))
-    return [better.get(id(each), each) for each in tried]
+        return list(pool.map(led_on, tried))
 
 
 def _grounds_of_sets(weighed: tuple[Weighed, ...], depth: int, track: Track, lacks: bool) -> list[Fitted]:
