@@ -144,10 +144,11 @@ def _parts_led(
     sets = sorted(sets, key=_lowest)[:LEADS]
 
     def led_on(part: Fitted) -> Fitted:
-        wholes = [each for each in sets if set(part.hypothesis.effects) < set(each.hypothesis.effects)]
-        for whole in [each for each in wholes if each.evidence > part.evidence]:
-            part = _climbed_on(part, whole, stages, options)
-        return part
+        effects, found = set(part.hypothesis.effects), part
+        for whole in sets:
+            if effects < set(whole.hypothesis.effects) and whole.evidence > part.evidence:
+                found = _climbed_on(found, whole, stages, options)
+        return found
 
     with ThreadPoolExecutor(options.workers) as pool:
         return list(pool.map(led_on, tried))
