@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
-from functools import cache
 
 import numpy as np
 
@@ -29,11 +27,10 @@ HELD_AT = np.array([-1.1, 0.0, 0.0])
 """Of the base in the square table's frame, who holds it [m, rad]."""
 
 
-@cache
 def compile_kernels() -> None:
     """Plan in a small room, find a grasp and a way there: whatever planning calls is compiled, or loaded, after this.
 
-    Some tens of seconds on a machine that has never planned, half a second later on; once in a process.
+    Some tens of seconds on a machine that has never planned, half a second later on.
     """
     room = np.array([(0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0)])
     movable = {"square": Movable(np.array(SQUARE), mass=33.0), "long": Movable(np.array(LONG), mass=38.0)}
@@ -59,13 +56,6 @@ def compile_kernels() -> None:
         find_way(NamoScene.of(room, {}, {}, {}, start, goal), 1)
     except NamoError:
         return
-
-
-def compile_in_background() -> threading.Thread:
-    """Compile in a thread, and return it; while it is alive, Python cannot end in order."""
-    thread = threading.Thread(target=compile_kernels, name="warming", daemon=True)
-    thread.start()
-    return thread
 
 
 def _nothing(begin: float, end: float) -> Recording:

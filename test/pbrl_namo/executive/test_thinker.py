@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import threading
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -13,7 +10,7 @@ from office_of_fakes import office
 
 from pbrl_control.kinematics import RobotKinematics
 from pbrl_namo.errors import NamoError
-from pbrl_namo.executive import Answer, ImmediateThinker, Job, LearnAnswer, LearnJob, Lost, Move, PoolThinker, Refused
+from pbrl_namo.executive import Answer, ImmediateThinker, Job, LearnAnswer, LearnJob, Lost, Move, Refused
 from pbrl_namo.executive.jobs import finite
 from pbrl_namo.executive.settings import JobSettings
 from pbrl_namo.executive.thinker import Question
@@ -111,73 +108,6 @@ def test_what_is_dropped_is_not_answered() -> None:
     thinker.begin(JOB)
     thinker.drop()
     assert thinker.poll() is None
-
-
-def threads() -> Executor:
-    return ThreadPoolExecutor(1)
-
-
-def test_a_thread_thinks_while_the_tick_goes_on() -> None:
-    gate = threading.Event()
-
-    def slow(job: Job) -> Answer:
-        gate.wait(10.0)
-        return LearnAnswer("belief")
-
-    thinker = PoolThinker(slow, threads)
-    thinker.begin(JOB)
-    assert thinker.poll() is None
-    gate.set()
-    answer = polled(thinker)
-    assert answer == LearnAnswer("belief")
-    assert thinker.poll() is None
-    thinker.close()
-
-
-def test_a_dropped_thought_is_thrown_away() -> None:
-    gate, answers = threading.Event(), iter((LearnAnswer("old"), LearnAnswer("new")))
-
-    def slow(job: Job) -> Answer:
-        gate.wait(10.0)
-        return next(answers)
-
-    thinker = PoolThinker(slow, threads)
-    thinker.begin(JOB)
-    thinker.begin(JOB)
-    gate.set()
-    assert isinstance(polled(thinker), LearnAnswer)
-    thinker.close()
-
-
-def die(job: Job) -> Answer:
-    os._exit(3)
-
-
-def test_a_process_that_dies_is_a_loss_and_the_next_one_lives() -> None:
-    thinker = PoolThinker(die, lambda: ProcessPoolExecutor(1))
-    thinker.begin(JOB)
-    answer = polled(thinker)
-    assert isinstance(answer, Lost)
-    assert "BrokenProcessPool" in answer.reason
-    thinker._answer = learned
-    thinker.begin(JOB)
-    assert polled(thinker) == LearnAnswer("belief")
-    thinker.close()
-
-
-def learned(job: Job) -> Answer:
-    return LearnAnswer("belief")
-
-
-def polled(thinker: PoolThinker) -> Answer | None:
-    future: Future[Answer] | None = thinker._future
-    assert future is not None
-    if not future.done():
-        try:
-            future.result(timeout=20.0)
-        except Exception:
-            assert future.done()
-    return thinker.poll()
 
 
 def move(**more: object) -> Move:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import struct
 import threading
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from rclpy.serialization import deserialize_message
 
+from pbrl_bag.builder import RecordingBuilder
 from pbrl_bag.errors import BagError
 from pbrl_bag.roles import GRASPS_TOPIC, SCENE_TOPIC
+from pbrl_bag.types import Recording
 
 BEFORE = 3.0
 """Kept of what comes before a hold [s]: weight and bias of a wrist are read there, and the smoother looks back."""
@@ -175,3 +178,15 @@ class Heard:
         if self._held_since is not None and stamp >= self._held_since - BEFORE:
             return True
         return any(start - BEFORE <= stamp <= end + AFTER for start, end in self._holds)
+
+
+def recording_of(messages: Iterable[Message]) -> Recording:
+    """Return what messages say as a recording.
+
+    Raises:
+        BagError: a topic is missing or a stream is malformed.
+    """
+    builder = RecordingBuilder()
+    for message in messages:
+        builder.add(message.topic, message.decoded())
+    return builder.build("what was heard")

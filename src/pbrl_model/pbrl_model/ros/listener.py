@@ -22,7 +22,7 @@ from pbrl_bag.roles import GRASPS_TOPIC, SCENE_TOPIC
 from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.types import Recording
-from pbrl_model.ros.heard import Heard, Message
+from pbrl_model.ros.heard import Heard, Message, recording_of
 
 DISCOVERY_SECONDS = 0.1
 MEMORY = 200.0
@@ -112,10 +112,11 @@ class RecordingListener(Node):
         Raises:
             BagError: a topic is missing or a stream is malformed.
         """
-        builder = RecordingBuilder()
-        for message in self._heard.kept():
-            builder.add(message.topic, message.decoded())
-        return builder.build("what was heard")
+        return recording_of(self.kept())
+
+    def kept(self) -> list[Message]:
+        """Return the messages that have been heard so far and not been forgotten; see `recording_of`."""
+        return self._heard.kept()
 
     def discover(self) -> None:
         """Subscribe to what is new, and again where a publisher came whom the old request keeps out."""

@@ -20,10 +20,11 @@ from pbrl_namo.executive.jobs import (
 )
 from pbrl_namo.executive.opening_check import OpenByFreeSpace
 from pbrl_namo.executive.parts import OpeningCheck
+from pbrl_namo.executive.process_thinker import ProcessThinker
 from pbrl_namo.executive.report import NamoStatus, status_of
 from pbrl_namo.executive.settings import ExecutiveSettings
 from pbrl_namo.executive.table import TABLE, Event, State
-from pbrl_namo.executive.thinker import ImmediateThinker, PoolThinker, Thinker
+from pbrl_namo.executive.thinker import ImmediateThinker, Thinker
 
 __all__ = [
     "TABLE",
@@ -49,7 +50,7 @@ __all__ = [
     "Order",
     "PlanAnswer",
     "PlanJob",
-    "PoolThinker",
+    "ProcessThinker",
     "Refused",
     "State",
     "Thinker",

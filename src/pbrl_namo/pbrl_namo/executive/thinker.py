@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import Protocol
 
 from pbrl_control.errors import ControlError
@@ -52,60 +51,6 @@ class ImmediateThinker:
     def drop(self) -> None:
         """See `Thinker.drop`."""
         self._found = None
-
-
-class PoolThinker:
-    """Has the work done by a thread or process pool; one that has broken down is made anew.
-
-    A job that was dropped while it ran is finished by its worker, and its answer thrown away.
-
-    Args:
-        answer: what does the work; for a process pool it can be pickled, as can jobs and answers.
-        make_pool: makes a pool of one worker at least.
-    """
-
-    def __init__(self, answer: Callable[[Job], Answer], make_pool: Callable[[], Executor]) -> None:
-        self._answer = answer
-        self._make_pool = make_pool
-        self._pool: Executor | None = None
-        self._future: Future[Answer] | None = None
-
-    def begin(self, job: Job) -> None:
-        """See `Thinker.begin`."""
-        self.drop()
-        self._pool = self._pool or self._make_pool()
-        try:
-            self._future = self._pool.submit(answered, self._answer, job)
-        except BrokenExecutor as error:
-            self._pool = None
-            self._future = Future()
-            self._future.set_result(Lost(_one_line(error)))
-
-    def poll(self) -> Answer | None:
-        """See `Thinker.poll`."""
-        future = self._future
-        if future is None or not future.done():
-            return None
-        self._future = None
-        try:
-            return future.result()
-        except Exception as error:  # a worker that died, or something that cannot be pickled
-            if isinstance(error, BrokenExecutor):
-                self._pool = None
-            return Lost(_one_line(error))
-
-    def drop(self) -> None:
-        """See `Thinker.drop`."""
-        if self._future is not None:
-            self._future.cancel()
-        self._future = None
-
-    def close(self) -> None:
-        """Let the pool go; what is under way is not waited for."""
-        self.drop()
-        if self._pool is not None:
-            self._pool.shutdown(wait=False, cancel_futures=True)
-        self._pool = None
 
 
 def answered(answer: Callable[[Job], Answer], job: Job) -> Answer:

@@ -6,15 +6,14 @@ after the end. It ticks on the node's clock, simulated or not; where that clock 
 after whoever is needed, on a steady clock: while the joint states, the body controller or the grippers' service are
 gone the robot rests, and what is held is let go when they are back.
 
-Plans, grasps and models are thought of in a thread, from all that was heard while something was held; another one
-compiles ahead what planning calls.
+Plans, grasps and models are thought of in a process of its own, which is given all that was heard while something was
+held, and which compiles ahead what planning calls.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
@@ -45,7 +44,7 @@ from pbrl_model.errors import ModelError
 from pbrl_model.ros.listener import MEMORY, RecordingListener
 from pbrl_namo.beliefs.belief import ObjectBelief
 from pbrl_namo.errors import NamoError
-from pbrl_namo.executive import NamoExecutive, OpenByFreeSpace, Order, PoolThinker, State, status_of
+from pbrl_namo.executive import NamoExecutive, OpenByFreeSpace, Order, State, status_of
 from pbrl_namo.executive.step import rest
 from pbrl_namo.executive.table import ENDED
 from pbrl_namo.ros.conversions import belief_from_msg, goal_from_pose, goal_from_text, masses_from_msg, status_to_msg
@@ -53,9 +52,7 @@ from pbrl_namo.ros.goal_server import GoalServer
 from pbrl_namo.ros.hearing import JOINT_STATES, SHARE, Hearing
 from pbrl_namo.ros.liveness import Liveness
 from pbrl_namo.ros.markers import Drawing, draw
-from pbrl_namo.ros.planned import Planned
-from pbrl_namo.thinking import Thoughts
-from pbrl_namo.warming import compile_in_background
+from pbrl_namo.ros.thinker import NodeThinker
 
 GONE = 1.0
 """Silence after which somebody counts as gone [s]."""
@@ -84,8 +81,7 @@ class NamoNode(Node):
             params_folder("settings") / "body_controller.yaml", ControllerSettings, "settings"
         )
         self._listener = RecordingListener(f"{self.get_name()}_listener", self.context, memory, self.get_namespace())
-        self._planned = Planned(Thoughts(lambda begin, end: self._listener.recording()))
-        self._thinker = PoolThinker(self._planned, lambda: ThreadPoolExecutor(1))
+        self._thinker = NodeThinker(self._listener.kept)
         self._kinematics: RobotKinematics | None = None
         self._executive: NamoExecutive | None = None
         self._beliefs: dict[str, ObjectBelief] = {}
@@ -103,14 +99,8 @@ class NamoNode(Node):
         diagnostics.subscribe(ObjectModels, "object_models", self._on_models, LATCHED, needed=False)
         self._create_outputs()
         self._listener.start()
-        self._warming = compile_in_background()
         self.create_timer(1.0 / rate, self._tick)
         self.create_timer(1.0 / LOOKS, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
-
-    @property
-    def thinking(self) -> bool:
-        """Whether a job is being answered or kernels are being compiled: those threads cannot be stopped."""
-        return self._planned.busy or self._warming.is_alive()
 
     def _doing(self) -> str:
         if self._executive is None:
@@ -287,7 +277,7 @@ class NamoNode(Node):
         self._status.publish(message)
         if self._goals is not None:
             self._goals.tell(message)
-        drawn = draw(status, self._executive.mission.planned.move, self._planned.floor)
+        drawn = draw(status, self._executive.mission.planned.move, self._thinker.floor)
         self._markers.publish(self._drawing.update(drawn, stamp))
 
     # Grippers
@@ -329,7 +319,6 @@ def main() -> None:
             NamoError,
         ),
         spin=spin_in_order,
-        busy=lambda node: node.thinking,
     )
 
 

@@ -1,0 +1,122 @@
+"""Has the executive's jobs answered by a process of its own: who plans or learns there holds up nobody here."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from pbrl_namo.executive.jobs import Lost
+
+Make = Callable[[], Callable[[Any], Any]]
+"""Called once in the process; returns what answers there. A function of a module, so that the process can find it."""
+
+
+class ProcessThinker:
+    """Has the work done by a process of its own; one that has died is made anew, one whose job is dropped is ended.
+
+    Learning takes minutes of Python. In a thread it would share one interpreter with whoever ticks and listens, and
+    each would take the other's time; and a thread cannot be ended, so that the next job would wait for one that nobody
+    wants.
+
+    Args:
+        make: see `Make`.
+    """
+
+    def __init__(self, make: Make) -> None:
+        self._make = make
+        self._worker: _Worker | None = None
+        self._future: Future[Any] | None = None
+
+    def start(self) -> None:
+        """Make the process, which then is ready when the first job comes."""
+        if self._worker is None or not self._worker.lives:
+            self._worker = _Worker(self._make)
+
+    def begin(self, job: Any) -> None:
+        """See `Thinker.begin`; a job is whatever can be pickled and is understood there."""
+        self.drop()
+        self.start()
+        assert self._worker is not None
+        self._future = self._worker.ask(job)
+
+    def poll(self) -> Any | None:
+        """See `Thinker.poll`."""
+        future = self._future
+        if future is None or not future.done():
+            return None
+        self._future = None
+        return future.result()
+
+    def drop(self) -> None:
+        """See `Thinker.drop`."""
+        if self._future is not None and not self._future.done():
+            self.close()
+        self._future = None
+
+    def close(self) -> None:
+        """End the process, whatever it is at."""
+        if self._worker is not None:
+            self._worker.end()
+        self._worker = self._future = None
+
+
+class _Worker:
+    """One process, and the thread that waits for it: what is sent may be more than a pipe takes at once."""
+
+    def __init__(self, make: Make) -> None:
+        context = get_context("spawn")
+        self._ours, theirs = context.Pipe()
+        self._process = context.Process(target=_work, args=(make, theirs), name="thinking", daemon=True)
+        self._process.start()
+        theirs.close()  # so that a read ends where the process does
+
+    @property
+    def lives(self) -> bool:
+        return self._process.is_alive()
+
+    def ask(self, job: Any) -> Future[Any]:
+        """Have something answered; the future fails never: it is `Lost` where the process dies."""
+        future: Future[Any] = Future()
+        threading.Thread(target=self._ask, args=(job, future), name="asking", daemon=True).start()
+        return future
+
+    def end(self) -> None:
+        self._process.kill()
+        self._process.join()
+
+    def _ask(self, job: Any, future: Future[Any]) -> None:
+        try:
+            self._ours.send(job)
+            future.set_result(self._ours.recv())
+        except (EOFError, OSError):
+            self._process.join()
+            future.set_result(Lost(f"the process that thinks ended with exit code {self._process.exitcode}"))
+        except Exception as error:  # something that cannot be pickled
+            future.set_result(Lost(" ".join(f"{type(error).__name__}: {error}".split())))
+
+
+def _work(make: Make, pipe: Connection) -> None:
+    """Answer what comes through a pipe until it is closed, or the parent ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C, which the terminal sends to all, is the parent's
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    answer = make()
+    while True:
+        try:
+            job = pipe.recv()
+        except EOFError:
+            return
+        pipe.send(answer(job))
+
+
+def _end_with_parent() -> None:
+    """End this process, whatever it is at, as soon as its parent has ended: a killed one closes nothing."""
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
