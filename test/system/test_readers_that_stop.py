@@ -25,6 +25,9 @@ LASTS = 8.0
 NO_SLOWER, PAUSE = 0.5, 1.0
 """Share of the speed before it came that is left at least, on a machine that has other work too; and the longest
 silence beyond the longest before it [s]. Who waited would go at a tenth of the speed: each message waits 0.1 s."""
+TRIES = 3
+"""Readers that stop, one after the other, until one of them holds up nobody: whoever waits for such a reader waits for
+each, where a machine that has other work is late now and then."""
 RATE = 0.5
 
 
@@ -73,17 +76,25 @@ def test_nobody_waits_for_a_reader_that_has_stopped(tmp_path: Path, nothing_left
         watcher = Watcher(context, programs)
         watcher.until_heard()
         alone, usual = watcher.listen(LASTS)
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        command = [sys.executable, str(READER), str(TOPICS)]
-        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as reader:
-            try:
-                assert reader.stdout is not None
-                assert int(reader.stdout.readline()) >= TOPICS
-                os.waitpid(reader.pid, os.WUNTRACED)  # it has stopped
-                rate, silence = watcher.listen(LASTS)
-            finally:
-                reader.kill()
+        for _ in range(TRIES):
+            rate, silence = beside_a_stopped_reader(watcher, domain)
+            if rate > NO_SLOWER * alone and silence < usual + PAUSE:
+                break
         watcher.leave()
         rclpy.try_shutdown(context=context)
     assert rate > NO_SLOWER * alone, "the simulator does not wait for it"
     assert silence < usual + PAUSE
+
+
+def beside_a_stopped_reader(watcher: Watcher, domain: int) -> tuple[float, float]:
+    """Start a reader and wait until it has stopped; return what `listen` then hears, and kill it."""
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    command = [sys.executable, str(READER), str(TOPICS)]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as reader:
+        try:
+            assert reader.stdout is not None
+            assert int(reader.stdout.readline()) >= TOPICS
+            os.waitpid(reader.pid, os.WUNTRACED)  # it has stopped
+            return watcher.listen(LASTS)
+        finally:
+            reader.kill()
