@@ -1,4 +1,4 @@
-"""The command line as a person meets it: real processes, exit codes, one line for each mistake."""
+"""The command line as a person meets it: exit codes, one line for each mistake, and that in a process of its own."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,31 @@ NAMED = [
 COMMANDS = sorted(command.name or command.callback.__name__ for command in app.registered_commands if command.callback)
 
 
-def pbrl(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pbrl_bringup", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120)
+@dataclass
+class Ended:
+    """How a command ended, and what it said."""
+
+    returncode: int
+    stdout: str
+    stderr: str
 
 
-def assert_one_line(result: subprocess.CompletedProcess[str], *words: str) -> None:
+Pbrl = Callable[..., Ended]
+
+
+@pytest.fixture
+def pbrl(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Pbrl:
+    """Run a command in this process: one of its own takes seconds to import all that a fit needs."""
+
+    def run(*arguments: str, cwd: Path) -> Ended:
+        monkeypatch.chdir(cwd)
+        capsys.readouterr()
+        return Ended(run_arguments(arguments), *capsys.readouterr())
+
+    return run
+
+
+def assert_one_line(result: Ended | subprocess.CompletedProcess[str], *words: str) -> None:
     """The mistake is told in one line on stderr that holds every word, and the exit code is 2."""
     lines = result.stderr.strip().splitlines()
     assert result.returncode == 2, result.stderr
@@ -70,19 +90,26 @@ def test_randomness_has_a_seed(name: str, capsys: pytest.CaptureFixture[str]) ->
         (("play", "nowhere"), ("nowhere",)),
     ],
 )
-def test_mistakes_are_one_line(arguments: tuple[str, ...], words: tuple[str, ...], tmp_path: Path) -> None:
+def test_mistakes_are_one_line(arguments: tuple[str, ...], words: tuple[str, ...], pbrl: Pbrl, tmp_path: Path) -> None:
     assert_one_line(pbrl(*arguments, cwd=tmp_path), *words)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_unknown_scene_key_is_named(tmp_path: Path) -> None:
+def test_so_they_are_in_a_process_of_its_own(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "pbrl_bringup", "fit", "nowhere.mcap"]
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert_one_line(ended, "nowhere.mcap")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_scene_key_is_named(pbrl: Pbrl, tmp_path: Path) -> None:
     (tmp_path / "scene.yaml").write_text("room: {outline: [[0, 0], [4, 0], [4, 4], [0, 4]]}\nbodeis: {}\n")
     result = pbrl("simulate", "scene.yaml", "--out", "bag", cwd=tmp_path)
     assert_one_line(result, "scene.yaml", "bodeis", "bodies")
     assert not (tmp_path / "bag").exists()
 
 
-def test_a_recording_is_not_written_over(tmp_path: Path) -> None:
+def test_a_recording_is_not_written_over(pbrl: Pbrl, tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag/precious").touch()
     for arguments in (("simulate", "locked_caster"), ("record",)):
@@ -126,7 +153,7 @@ def no_duration(topic: str, index: int, message: Any) -> Any:
     ids=["no scene", "no pose", "no wrench", "NaN", "jump", "zero length"],
 )
 def test_a_malformed_recording_is_one_line(
-    command: str, edit: Callable[[str, int, Any], Any], words: tuple[str, ...], make_bag: MakeBag
+    command: str, edit: Callable[[str, int, Any], Any], words: tuple[str, ...], pbrl: Pbrl, make_bag: MakeBag
 ) -> None:
     bag = make_bag(edit)
     result = pbrl(command, "bag", *(["--out", "out"] if command == "fit" else []), cwd=bag.parent)
@@ -135,7 +162,7 @@ def test_a_malformed_recording_is_one_line(
 
 
 @pytest.mark.parametrize("command", ["info", "fit"])
-def test_a_truncated_file_is_one_line(command: str, make_bag: MakeBag) -> None:
+def test_a_truncated_file_is_one_line(command: str, pbrl: Pbrl, make_bag: MakeBag) -> None:
     bag = make_bag()
     file = next(bag.glob("*.mcap"))
     with file.open("r+b") as opened:
@@ -145,7 +172,7 @@ def test_a_truncated_file_is_one_line(command: str, make_bag: MakeBag) -> None:
     assert not (bag.parent / "out").exists()
 
 
-def test_info_tells_what_a_recording_holds(make_bag: MakeBag) -> None:
+def test_info_tells_what_a_recording_holds(pbrl: Pbrl, make_bag: MakeBag) -> None:
     bag = make_bag()
     result = pbrl("info", "bag", cwd=bag.parent)
     assert result.returncode == 0, result.stderr
