@@ -14,7 +14,9 @@ from pbrl_model import FitOptions, fit_recording
 
 def test_the_real_door_turns_about_its_hinge() -> None:
     recording = read_recording(data_file(RECORDING), config_file("mappings", "pr2_cabinet"))
-    fit = fit_recording(recording, FitOptions(model_class="hinge", seed=3, draws=100, holdout_share=0.0))
+    fit = fit_recording(
+        recording, FitOptions(model_class="hinge", seed=3, search_draws=100, draws=50, holdout_share=0.0)
+    )
     found = fit.objects["door"]
     assert abs(found.posterior.column("hinge_radius").mean() - RADIUS) < SLACK
     recorded = np.vstack([motion.pose[:, :2] for motion in found.motions])

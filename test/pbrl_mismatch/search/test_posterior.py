@@ -83,7 +83,7 @@ def test_when_a_load_was_put_down_lies_where_they_say_as_often_as_they_say(track
     laden = free.with_effect(EFFECTS["payload_change"], scene, 0)
     mass, at = (laden.columns.index(name) for name in ("payload_mass", "payload_time"))
     within = 0
-    for seed in range(12):
+    for seed in range(8):
         rng = np.random.default_rng(seed)
         truth = laden.mean.copy()
         truth[mass] = np.log(0.15 * 20.0)
@@ -91,7 +91,7 @@ def test_when_a_load_was_put_down_lies_where_they_say_as_often_as_they_say(track
         peak = alone(climb(told(rng, track, laden, truth[None]), truth[None], iterations=6))
         low, high = np.percentile(evolved(rng, peak)[:, at], [5.0, 95.0])
         within += bool(low < truth[at] < high)
-    assert within >= 8
+    assert within >= 5
 
 
 def test_same_seed_same_bytes_in_any_number_of_threads(track: Any, free: Any) -> None:
