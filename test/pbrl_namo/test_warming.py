@@ -12,10 +12,8 @@ KERNELS = (efforts, roll, nearer_than, contact_serial, contact_parallel)
 
 
 def test_it_compiles_the_kernels_of_manipulation() -> None:
-    compile_kernels.cache_clear()
     compile_kernels()
     known = [len(kernel.signatures) for kernel in KERNELS]
     assert min(known) >= 1
-    compile_kernels.cache_clear()
     compile_kernels()
     assert [len(kernel.signatures) for kernel in KERNELS] == known

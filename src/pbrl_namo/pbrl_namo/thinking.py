@@ -1,6 +1,6 @@
 """What answers the executive's jobs: the NAMO planner, the search for grasps and ways, learning, diagnosis.
 
-Only numbers go in and out, so that it works in a thread or a process of its own as well as at once; see `PoolThinker`.
+Only numbers go in and out, so that it works in a process of its own as well as at once; see `ProcessThinker`.
 """
 
 from __future__ import annotations
