@@ -78,10 +78,36 @@ def test_what_cannot_be_sent_is_a_loss(thinker: ProcessThinker) -> None:
 def test_a_job_that_is_dropped_ends_and_the_next_one_does_not_wait_for_it(thinker: ProcessThinker) -> None:
     thinker.begin("who")
     ended = os.pidfd_open(polled(thinker))
+    assert thinker._worker is not None and thinker._worker._ready.wait(WAIT)
     thinker.begin("sleep")
+    begun(thinker)
     thinker.begin("word")
     assert gone(ended)
     assert polled(thinker) == 4
+
+
+def test_while_it_compiles_a_job_that_is_dropped_is_done_and_its_answer_thrown_away() -> None:
+    thinker = ProcessThinker(fake_thoughts.make, fake_thoughts.forever)
+    try:
+        thinker.begin("who")
+        before = polled(thinker)
+        thinker.begin("nap")
+        begun(thinker)
+        thinker.begin("sleep")
+        thinker.drop()  # it has not been sent yet, and never is
+        thinker.begin("who")
+        assert polled(thinker) == before
+        assert thinker.poll() is None
+    finally:
+        thinker.close()
+
+
+def begun(thinker: ProcessThinker) -> None:
+    """Wait until a job is on its way: one that is not is called off, and nothing else happens."""
+    until = time.monotonic() + WAIT
+    while thinker._future is not None and not thinker._future.running():
+        assert time.monotonic() < until
+        time.sleep(0.001)
 
 
 def test_it_is_not_left_behind_by_one_who_is_killed() -> None:

@@ -148,7 +148,7 @@ def lay_track(
 def _feet(geometry: BodyGeometry) -> Array:
     """Return the points that carry the load: casters where they are told, else near the corners of the outline."""
     if len(geometry.casters) >= 3:
-        return np.ascontiguousarray(geometry.casters, dtype=float)
+        return np.array(geometry.casters, dtype=float, order="C")  # one that is read-only would be compiled for anew
     lower, upper = bounding_box(geometry.footprint)
     middle, half = 0.5 * (lower + upper), 0.5 * FEET_SHARE * (upper - lower)
     return middle + half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

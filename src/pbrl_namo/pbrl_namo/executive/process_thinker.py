@@ -9,6 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
+from multiprocessing.synchronize import Event
 from typing import Any
 
 from pbrl_namo.executive.jobs import Lost
@@ -17,26 +18,33 @@ Make = Callable[[], Callable[[Any], Any]]
 """Called once in the process; returns what answers there. A function of a module, so that the process can find it."""
 
 
+def nothing() -> None:
+    """Do nothing ahead."""
+
+
 class ProcessThinker:
     """Has the work done by a process of its own; one that has died is made anew, one whose job is dropped is ended.
 
-    Learning takes minutes of Python. In a thread it would share one interpreter with whoever ticks and listens, and
-    each would take the other's time; and a thread cannot be ended, so that the next job would wait for one that nobody
-    wants.
+    Not ended is one that still compiles: that would be lost, and a job that waits for a compiler for longer than
+    somebody's patience would never be done. Its answer is thrown away, and the next job waits for it.
+
+    A thread instead would share one interpreter with whoever ticks and listens, and each would take the other's time;
+    nor can it be ended, so that the next job would wait for one that nobody wants.
 
     Args:
         make: see `Make`.
+        ahead: done there besides, from then on: what a later job will need.
     """
 
-    def __init__(self, make: Make) -> None:
-        self._make = make
+    def __init__(self, make: Make, ahead: Callable[[], None] = nothing) -> None:
+        self._make, self._ahead = make, ahead
         self._worker: _Worker | None = None
         self._future: Future[Any] | None = None
 
     def start(self) -> None:
         """Make the process, which then is ready when the first job comes."""
         if self._worker is None or not self._worker.lives:
-            self._worker = _Worker(self._make)
+            self._worker = _Worker(self._make, self._ahead)
 
     def begin(self, job: Any) -> None:
         """See `Thinker.begin`; a job is whatever can be pickled and is understood there."""
@@ -55,9 +63,11 @@ class ProcessThinker:
 
     def drop(self) -> None:
         """See `Thinker.drop`."""
-        if self._future is not None and not self._future.done():
+        future, self._future = self._future, None
+        if future is None or future.done() or future.cancel():
+            return
+        if self._worker is not None and self._worker.ready:
             self.close()
-        self._future = None
 
     def close(self) -> None:
         """End the process, whatever it is at."""
@@ -69,16 +79,23 @@ class ProcessThinker:
 class _Worker:
     """One process, and the thread that waits for it: what is sent may be more than a pipe takes at once."""
 
-    def __init__(self, make: Make) -> None:
+    def __init__(self, make: Make, ahead: Callable[[], None]) -> None:
         context = get_context("spawn")
         self._ours, theirs = context.Pipe()
-        self._process = context.Process(target=_work, args=(make, theirs), name="thinking", daemon=True)
+        self._ready, self._turn = context.Event(), threading.Lock()
+        told = (make, ahead, theirs, self._ready)
+        self._process = context.Process(target=_work, args=told, name="thinking", daemon=True)
         self._process.start()
         theirs.close()  # so that a read ends where the process does
 
     @property
     def lives(self) -> bool:
         return self._process.is_alive()
+
+    @property
+    def ready(self) -> bool:
+        """Whether all is done that was to be done ahead."""
+        return self._ready.is_set()
 
     def ask(self, job: Any) -> Future[Any]:
         """Have something answered; the future fails never: it is `Lost` where the process dies."""
@@ -91,27 +108,40 @@ class _Worker:
         self._process.join()
 
     def _ask(self, job: Any, future: Future[Any]) -> None:
+        with self._turn:
+            if future.set_running_or_notify_cancel():
+                future.set_result(self._answer(job))
+
+    def _answer(self, job: Any) -> Any:
         try:
             self._ours.send(job)
-            future.set_result(self._ours.recv())
+            return self._ours.recv()
         except (EOFError, OSError):
             self._process.join()
-            future.set_result(Lost(f"the process that thinks ended with exit code {self._process.exitcode}"))
+            return Lost(f"the process that thinks ended with exit code {self._process.exitcode}")
         except Exception as error:  # something that cannot be pickled
-            future.set_result(Lost(" ".join(f"{type(error).__name__}: {error}".split())))
+            return Lost(" ".join(f"{type(error).__name__}: {error}".split()))
 
 
-def _work(make: Make, pipe: Connection) -> None:
+def _work(make: Make, ahead: Callable[[], None], pipe: Connection, ready: Event) -> None:
     """Answer what comes through a pipe until it is closed, or the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C, which the terminal sends to all, is the parent's
     threading.Thread(target=_end_with_parent, daemon=True).start()
     answer = make()
+    threading.Thread(target=_do_ahead, args=(ahead, ready), daemon=True).start()
     while True:
         try:
             job = pipe.recv()
         except EOFError:
             return
         pipe.send(answer(job))
+
+
+def _do_ahead(ahead: Callable[[], None], ready: Event) -> None:
+    try:
+        ahead()
+    finally:
+        ready.set()
 
 
 def _end_with_parent() -> None:

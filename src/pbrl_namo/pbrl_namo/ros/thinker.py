@@ -11,7 +11,7 @@ from pbrl_namo.executive.thinker import answered
 from pbrl_namo.regions.free_space import free_space
 from pbrl_namo.ros.markers import Floor
 from pbrl_namo.thinking import Thoughts
-from pbrl_namo.warming import compile_kernels
+from pbrl_namo.warming import compile_kernels, compile_learning
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class NodeThinker:
     def __init__(self, heard: Callable[[], list[Message]]) -> None:
         self.floor: Floor | None = None
         self._heard = heard
-        self._process = ProcessThinker(ready_to_think)
+        self._process = ProcessThinker(ready_to_think, compile_learning)
         self._process.start()
 
     def begin(self, job: Job) -> None:
