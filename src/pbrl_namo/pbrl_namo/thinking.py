@@ -57,8 +57,8 @@ Recorded = Callable[[float, float], Recording]
 KEPT_DRAWS = 400
 """Of a posterior; so many tell shares to a few per cent."""
 LEARNING = FitOptions(draws=KEPT_DRAWS // 4, burn_in=250, thin=2)
-"""As many draws as are kept. Where importance sampling fails, as for a thing that hardly moves, they are those of chains,
-and a robot that holds the thing waits for them: half a minute, where a fit's usual 5000 steps would take four."""
+"""As many draws as are kept. Where importance sampling fails, as for a thing that hardly moves, they are those of
+chains, and a robot that holds the thing waits for them: half a minute, where a fit's usual 5000 steps take four."""
 WIDER = (0.0, 0.06, 0.06)
 """By so much the disc that stands for the robot is widened, one after the other, while no way is found for it [m]."""
 SWIVEL, INSET = 0.07, 0.06

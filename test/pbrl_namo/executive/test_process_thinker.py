@@ -78,7 +78,7 @@ def test_what_cannot_be_sent_is_a_loss(thinker: ProcessThinker) -> None:
 def test_a_job_that_is_dropped_ends_and_the_next_one_does_not_wait_for_it(thinker: ProcessThinker) -> None:
     thinker.begin("who")
     ended = os.pidfd_open(polled(thinker))
-    assert thinker._worker is not None and thinker._worker._ready.wait(WAIT)
+    assert thinker._worker is not None and thinker._worker._done_ahead.poll(WAIT)
     thinker.begin("sleep")
     begun(thinker)
     thinker.begin("word")

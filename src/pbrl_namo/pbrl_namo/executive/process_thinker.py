@@ -9,7 +9,6 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
-from multiprocessing.synchronize import Event
 from typing import Any
 
 from pbrl_namo.executive.jobs import Lost
@@ -82,11 +81,14 @@ class _Worker:
     def __init__(self, make: Make, ahead: Callable[[], None]) -> None:
         context = get_context("spawn")
         self._ours, theirs = context.Pipe()
-        self._ready, self._turn = context.Event(), threading.Lock()
-        told = (make, ahead, theirs, self._ready)
+        # Not an event: its semaphores have names, which outlive a parent that is killed.
+        self._done_ahead, done = context.Pipe(duplex=False)
+        self._turn = threading.Lock()
+        told = (make, ahead, theirs, done)
         self._process = context.Process(target=_work, args=told, name="thinking", daemon=True)
         self._process.start()
         theirs.close()  # so that a read ends where the process does
+        done.close()
 
     @property
     def lives(self) -> bool:
@@ -95,7 +97,7 @@ class _Worker:
     @property
     def ready(self) -> bool:
         """Whether all is done that was to be done ahead."""
-        return self._ready.is_set()
+        return self._done_ahead.poll()
 
     def ask(self, job: Any) -> Future[Any]:
         """Have something answered; the future fails never: it is `Lost` where the process dies."""
@@ -106,6 +108,7 @@ class _Worker:
     def end(self) -> None:
         self._process.kill()
         self._process.join()
+        self._done_ahead.close()
 
     def _ask(self, job: Any, future: Future[Any]) -> None:
         with self._turn:
@@ -123,12 +126,12 @@ class _Worker:
             return Lost(" ".join(f"{type(error).__name__}: {error}".split()))
 
 
-def _work(make: Make, ahead: Callable[[], None], pipe: Connection, ready: Event) -> None:
+def _work(make: Make, ahead: Callable[[], None], pipe: Connection, done: Connection) -> None:
     """Answer what comes through a pipe until it is closed, or the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C, which the terminal sends to all, is the parent's
     threading.Thread(target=_end_with_parent, daemon=True).start()
     answer = make()
-    threading.Thread(target=_do_ahead, args=(ahead, ready), daemon=True).start()
+    threading.Thread(target=_do_ahead, args=(ahead, done), daemon=True).start()
     while True:
         try:
             job = pipe.recv()
@@ -137,11 +140,10 @@ def _work(make: Make, ahead: Callable[[], None], pipe: Connection, ready: Event)
         pipe.send(answer(job))
 
 
-def _do_ahead(ahead: Callable[[], None], ready: Event) -> None:
-    try:
+def _do_ahead(ahead: Callable[[], None], done: Connection) -> None:
+    """Do what is to be done ahead, and say so by the pipe's end."""
+    with done:
         ahead()
-    finally:
-        ready.set()
 
 
 def _end_with_parent() -> None:
