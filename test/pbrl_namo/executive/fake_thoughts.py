@@ -18,6 +18,10 @@ def forever() -> None:
     time.sleep(600.0)
 
 
+def shortly() -> None:
+    time.sleep(3.0)
+
+
 def answer(job: str) -> object:
     if job == "die":
         os._exit(3)

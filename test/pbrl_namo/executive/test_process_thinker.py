@@ -7,7 +7,7 @@ import select
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,9 @@ WAIT = 60.0
 """An answer takes at most so long [s], on a machine that has other work too."""
 
 
+Polled = Callable[[ProcessThinker], Any]
+
+
 @pytest.fixture
 def thinker() -> Iterator[ProcessThinker]:
     thinker = ProcessThinker(fake_thoughts.make)
@@ -27,17 +30,7 @@ def thinker() -> Iterator[ProcessThinker]:
     thinker.close()
 
 
-def polled(thinker: ProcessThinker) -> Any:
-    until = time.monotonic() + WAIT
-    while time.monotonic() < until:
-        answer = thinker.poll()
-        if answer is not None:
-            return answer
-        time.sleep(0.005)
-    raise TimeoutError
-
-
-def test_nobody_waits_while_it_thinks_and_an_answer_is_given_once(thinker: ProcessThinker) -> None:
+def test_nobody_waits_while_it_thinks_and_an_answer_is_given_once(thinker: ProcessThinker, polled: Polled) -> None:
     assert thinker.poll() is None
     thinker.begin("who")
     assert thinker.poll() is None, "it cannot have begun yet"
@@ -45,19 +38,19 @@ def test_nobody_waits_while_it_thinks_and_an_answer_is_given_once(thinker: Proce
     assert thinker.poll() is None
 
 
-def test_a_job_may_be_larger_than_a_pipe(thinker: ProcessThinker) -> None:
+def test_a_job_may_be_larger_than_a_pipe(thinker: ProcessThinker, polled: Polled) -> None:
     thinker.begin("x" * 10_000_000)
     assert polled(thinker) == 10_000_000
 
 
-def test_one_process_answers_one_job_after_the_other(thinker: ProcessThinker) -> None:
+def test_one_process_answers_one_job_after_the_other(thinker: ProcessThinker, polled: Polled) -> None:
     thinker.begin("who")
     first = polled(thinker)
     thinker.begin("who")
     assert polled(thinker) == first
 
 
-def test_a_process_that_dies_is_a_loss_and_the_next_one_lives(thinker: ProcessThinker) -> None:
+def test_a_process_that_dies_is_a_loss_and_the_next_one_lives(thinker: ProcessThinker, polled: Polled) -> None:
     thinker.begin("die")
     answer = polled(thinker)
     assert isinstance(answer, Lost)
@@ -66,7 +59,7 @@ def test_a_process_that_dies_is_a_loss_and_the_next_one_lives(thinker: ProcessTh
     assert polled(thinker) == 4
 
 
-def test_what_cannot_be_sent_is_a_loss(thinker: ProcessThinker) -> None:
+def test_what_cannot_be_sent_is_a_loss(thinker: ProcessThinker, polled: Polled) -> None:
     thinker.begin(lambda: None)
     answer = polled(thinker)
     assert isinstance(answer, Lost)
@@ -75,7 +68,9 @@ def test_what_cannot_be_sent_is_a_loss(thinker: ProcessThinker) -> None:
     assert polled(thinker) == 4
 
 
-def test_a_job_that_is_dropped_ends_and_the_next_one_does_not_wait_for_it(thinker: ProcessThinker) -> None:
+def test_a_job_that_is_dropped_ends_and_the_next_one_does_not_wait_for_it(
+    thinker: ProcessThinker, polled: Polled
+) -> None:
     thinker.begin("who")
     ended = os.pidfd_open(polled(thinker))
     assert thinker._worker is not None and thinker._worker._done_ahead.poll(WAIT)
@@ -86,7 +81,7 @@ def test_a_job_that_is_dropped_ends_and_the_next_one_does_not_wait_for_it(thinke
     assert polled(thinker) == 4
 
 
-def test_while_it_compiles_a_job_that_is_dropped_is_done_and_its_answer_thrown_away() -> None:
+def test_while_it_compiles_a_job_that_is_dropped_is_done_and_its_answer_thrown_away(polled: Polled) -> None:
     thinker = ProcessThinker(fake_thoughts.make, fake_thoughts.forever)
     try:
         thinker.begin("who")
@@ -98,6 +93,20 @@ def test_while_it_compiles_a_job_that_is_dropped_is_done_and_its_answer_thrown_a
         thinker.begin("who")
         assert polled(thinker) == before
         assert thinker.poll() is None
+    finally:
+        thinker.close()
+
+
+def test_one_that_is_stuck_in_a_dropped_job_is_ended_with_the_next(polled: Polled) -> None:
+    thinker = ProcessThinker(fake_thoughts.make, fake_thoughts.shortly)
+    try:
+        thinker.begin("sleep")
+        begun(thinker)
+        thinker.drop()  # it still compiles
+        assert thinker._worker is not None and thinker._worker._done_ahead.poll(WAIT)
+        thinker.begin("word")  # waits for the one before
+        thinker.begin("word")
+        assert polled(thinker) == 4
     finally:
         thinker.close()
 

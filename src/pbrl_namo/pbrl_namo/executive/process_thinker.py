@@ -12,6 +12,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from pbrl_namo.executive.jobs import Lost
+from pbrl_namo.executive.thinker import one_line
 
 Make = Callable[[], Callable[[Any], Any]]
 """Called once in the process; returns what answers there. A function of a module, so that the process can find it."""
@@ -63,8 +64,9 @@ class ProcessThinker:
     def drop(self) -> None:
         """See `Thinker.drop`."""
         future, self._future = self._future, None
-        if future is None or future.done() or future.cancel():
+        if future is None or future.done():
             return
+        future.cancel()  # it may still wait for one that was dropped before, and would never be sent
         if self._worker is not None and self._worker.ready:
             self.close()
 
@@ -123,7 +125,7 @@ class _Worker:
             self._process.join()
             return Lost(f"the process that thinks ended with exit code {self._process.exitcode}")
         except Exception as error:  # something that cannot be pickled
-            return Lost(" ".join(f"{type(error).__name__}: {error}".split()))
+            return Lost(one_line(error))
 
 
 def _work(make: Make, ahead: Callable[[], None], pipe: Connection, done: Connection) -> None:

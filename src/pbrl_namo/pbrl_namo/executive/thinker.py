@@ -60,10 +60,11 @@ def answered(answer: Callable[[Job], Answer], job: Job) -> Answer:
     except (NamoError, ControlError, ModelError) as error:
         return Refused(" ".join(str(error).split()))
     except Exception as error:
-        return Lost(_one_line(error))
+        return Lost(one_line(error))
 
 
-def _one_line(error: BaseException) -> str:
+def one_line(error: BaseException) -> str:
+    """Return an error's kind and what it says, in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())
 
 
@@ -110,14 +111,14 @@ class Question:
         try:
             self._thinker.begin(self._job)
         except Exception as error:  # whatever a thinker does, the robot goes on ticking
-            return Lost(_one_line(error))
+            return Lost(one_line(error))
         return None
 
     def _poll(self) -> Answer | None:
         try:
             return self._thinker.poll()
         except Exception as error:
-            return Lost(_one_line(error))
+            return Lost(one_line(error))
 
     def _again(self, now: float, lost: Lost) -> Lost | None:
         self.lost.append(lost.reason)

@@ -7,7 +7,7 @@ after whoever is needed, on a steady clock: while the joint states, the body con
 gone the robot rests, and what is held is let go when they are back.
 
 Plans, grasps and models are thought of in a process of its own, which is given all that was heard while something was
-held, and which compiles ahead what planning calls.
+held, and which compiles ahead what they call.
 """
 
 from __future__ import annotations
