@@ -60,6 +60,28 @@ def test_of_two_effects_the_one_that_explains_more_alone_comes_first(monkeypatch
     fits: Any = SimpleNamespace(usual_scale=1.0, peak=peak)
     weights = {("hidden_obstacle", "unseen_body"): 0.0, ("unseen_body",): -9.0, ("hidden_obstacle",): -20.0, (): -50.0}
     weighed = tuple(Weighed(names, fits, value, float(value == 0.0), False) for names, value in weights.items())
-    found = findings_of(fits, weighed, fits)
+    found = findings_of(fits, weighed, fits, exact=True)
     assert found.effects == ("unseen_body", "hidden_obstacle")
     assert found.alternatives == ("unseen_body", "hidden_obstacle")
+
+
+@pytest.mark.parametrize(
+    ("names", "exact", "p_value", "named"),
+    [
+        (("wrench_bias",), True, 1e-9, False),
+        (("wrench_bias",), True, 1e-3, True),
+        (("wrench_bias",), False, 1e-9, True),  # a told baseline's casters are an idealisation
+        (("wrench_bias", "unseen_body"), True, 1e-9, True),  # so is a contact
+    ],
+)
+def test_an_exact_law_that_leaves_a_wrench_is_not_named(
+    monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], exact: bool, p_value: float, named: bool
+) -> None:
+    monkeypatch.setattr(report, "_described", lambda each, scene: each.effects)
+    monkeypatch.setattr(report, "predictive_test", lambda peak, row: SimpleNamespace(p_value=p_value))
+    fits: Any = SimpleNamespace(usual_scale=1.0, peak=SimpleNamespace(settled=[True]))
+    weighed = (Weighed(names, fits, 0.0, 1.0, False), Weighed((), fits, -50.0, 0.0, False))
+    found = findings_of(fits, weighed, fits, exact=exact)
+    assert found.effects == (names if named else ())
+    assert found.alternatives == (() if named else names)
+    assert any("leaves a wrench" in note for note in found.notes) != named

@@ -251,7 +251,7 @@ def _diagnose_object(
         likeliest = with_draws(np.random.default_rng(fourth), weighed[0].fitted, options.workers)
         weighed = (replace(weighed[0], fitted=likeliest), *weighed[1:])
     scene, rng = scene_of(track, baseline.row), np.random.default_rng(third)
-    found = findings_of(baseline, weighed, scene)
+    found = findings_of(baseline, weighed, scene, exact=told is None)
     residual = residual_wrench(track, baseline.row)
     floor = noise_floor(stages.split.told) if stages.split is not None else (math.nan, math.nan)
     named = found.effects[0].fitted if found.effects else baseline

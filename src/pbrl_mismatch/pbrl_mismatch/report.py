@@ -16,7 +16,7 @@ from pbrl_mismatch.effects.effect import Effect, Scene, Where
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.search.fitted import Fitted
-from pbrl_mismatch.search.predictive import Verdict
+from pbrl_mismatch.search.predictive import Verdict, predictive_test
 from pbrl_mismatch.search.weigh import Weighed
 
 Array = NDArray[np.float64]
@@ -27,6 +27,8 @@ EXPLAINED = 1.35
 """A hypothesis that needs a larger scale of the noise than this has not reached the noise floor."""
 SHARE_LEFT, NEAR = 0.1, 2.0
 """Unless it leaves less than this share of the baseline's scale, as a logarithm, and needs a scale below this."""
+LEFT_OUT = 1e-7
+"""Nor has one whose laws are all exact, where the test against any wrench gives it a smaller chance than this."""
 ALIKE = 3.0
 """Hypotheses within so many nats explain the recording alike."""
 SHOWN = 8
@@ -79,27 +81,25 @@ class Findings:
     notes: tuple[str, ...]
 
 
-def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene) -> Findings:
+def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *, exact: bool) -> Findings:
     """Decide what is named; of several effects together, the one that explains more alone comes first.
 
     Args:
         baseline: fitted.
         weighed: hypotheses, likeliest first; empty where nothing was searched.
         scene: what places are measured in.
+        exact: whether the baseline's own laws are; those of a model that is told may not be.
     """
     alone = [each.effects[0] for each in weighed if len(each.effects) == 1]
     others = [_weightiest_first(each, alone) for each in weighed if each.effects]
     if not others:
         return Findings((), (), ())
     best, notes = others[0], []
-    scale, before = best.fitted.usual_scale, baseline.usual_scale
-    reached = scale < EXPLAINED or (scale < NEAR and math.log(scale) < SHARE_LEFT * math.log(before))
-    named = bool(weighed[0].effects) and best.probability >= NAMED and reached and not best.vetoed
-    if not reached:
-        notes.append(
-            f"nothing in the library reaches the noise floor: the likeliest, {' and '.join(best.effects)}, "
-            f"is still off by {scale:.1f} times the noise"
-        )
+    short = _falls_short(best, baseline, exact=exact)
+    named = bool(weighed[0].effects) and best.probability >= NAMED and not short and not best.vetoed
+    if short:
+        names = " and ".join(best.effects)
+        notes.append(f"nothing in the library reaches the noise floor: the likeliest, {names}, {short}")
     if not bool(best.fitted.peak.settled[0]):
         notes.append(f"the fit of {' and '.join(best.effects)} had not settled: its numbers are rough")
     alike = [each for each in others[1:] if each.log_weight > best.log_weight - ALIKE]
@@ -109,6 +109,19 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene) ->
     rest = others[1:] if named else others
     alternatives = tuple(finding for each in rest[:SHOWN] for finding in _described(each, scene))
     return Findings(chosen, alternatives, tuple(notes))
+
+
+def _falls_short(best: Weighed, baseline: Fitted, *, exact: bool) -> str:
+    """Return in words by what a hypothesis falls short of the noise floor; nothing where it reaches it."""
+    scale, before = best.fitted.usual_scale, baseline.usual_scale
+    if scale >= EXPLAINED and (scale >= NEAR or math.log(scale) >= SHARE_LEFT * math.log(before)):
+        return f"is still off by {scale:.1f} times the noise"
+    # Laws of friction and of contacts are a little wrong of any floor: what they leave makes no effect unknown.
+    if exact and all(EFFECTS[name].exact for name in best.effects):
+        left = predictive_test(best.fitted.peak, 0).p_value
+        if left < LEFT_OUT:
+            return f"leaves a wrench that its law does not have (p = {max(left, LEAST_TOLD):.1g})"
+    return ""
 
 
 def _weightiest_first(weighed: Weighed, alone: list[str]) -> Weighed:

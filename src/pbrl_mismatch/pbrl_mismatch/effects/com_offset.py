@@ -38,4 +38,5 @@ EFFECT = Effect(
     where=where,
     place=("com_x", "com_y"),
     direction="body",
+    exact=True,
 )

@@ -137,6 +137,8 @@ class Effect:
         remembers: whether more moves than the body, so that its past matters.
         second: whether a baseline may have one such thing already, and stands between the two.
         sticks: whether it is dry friction, which a body at rest does not show the strength of.
+        exact: whether its law is what happens, and no idealisation of it as laws of friction and contacts are: what it
+            leaves beyond noise, another thing does.
         limit: name of the effect that it is the same as where what it adds to that is nothing.
     """
 
@@ -162,6 +164,7 @@ class Effect:
     remembers: bool = False
     second: bool = False
     sticks: bool = False
+    exact: bool = False
     limit: str | None = None
 
     def chosen(self, scene: Scene, variant: int) -> tuple[Parameter, ...]:

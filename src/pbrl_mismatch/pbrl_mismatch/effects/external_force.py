@@ -61,4 +61,5 @@ EFFECT = Effect(
     angles=("periodic_phase",),
     rhythm=("periodic_frequency", "periodic_phase"),
     linear=("steady_x", "steady_y", "steady_torque", "periodic_x", "periodic_y", "periodic_torque"),
+    exact=True,
 )

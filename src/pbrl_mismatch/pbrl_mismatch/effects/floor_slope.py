@@ -30,4 +30,5 @@ EFFECT = Effect(
     ),
     direction="world",
     linear=("slope_x", "slope_y"),
+    exact=True,
 )

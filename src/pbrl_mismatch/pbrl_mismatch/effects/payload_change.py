@@ -45,4 +45,5 @@ EFFECT = Effect(
     place=("payload_x", "payload_y"),
     direction="acceleration",
     linear=("payload_mass",),
+    exact=True,
 )

@@ -31,4 +31,5 @@ EFFECT = Effect(
         ),
     ),
     direction="body",
+    exact=True,
 )

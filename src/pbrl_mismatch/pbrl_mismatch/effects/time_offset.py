@@ -17,4 +17,5 @@ EFFECT = Effect(
     shows="Fast changes of the force.",
     parameters=parameters,
     variants=(("time_offset",),),
+    exact=True,
 )

@@ -28,4 +28,5 @@ EFFECT = Effect(
     ),
     direction="velocity",
     linear=("drag_linear", "drag_turn"),
+    exact=True,
 )

@@ -44,4 +44,5 @@ EFFECT = Effect(
     ),
     direction="gripper",
     linear=("bias_x", "bias_y", "bias_torque", "drift_x", "drift_y", "drift_torque"),
+    exact=True,
 )

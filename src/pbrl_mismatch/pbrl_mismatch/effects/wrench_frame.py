@@ -29,4 +29,5 @@ EFFECT = Effect(
     ),
     fixed={"torque_scale": -1.0},
     direction="gripper",
+    exact=True,
 )
