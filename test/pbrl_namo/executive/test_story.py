@@ -184,7 +184,9 @@ def test_long_thoughts_can_be_interrupted(world: Office, state: State, what: str
         executive.pause("sim_node is gone")
         assert world.tick(executive).state == State.PAUSED
         executive.resume()
-        assert world.tick(executive).state == (State.RELEASE if held else State.LOOK)
+        assert world.tick(executive).state == State.PAUSED, "until the robot stands"
+        after = State.RELEASE if held else State.LOOK
+        assert world.run(executive, to=after).state == after
     elif what == "aim":
         executive.aim(np.array([-2.5, 2.0, math.nan]))
         assert world.tick(executive).state == (state if held else State.LOOK)

@@ -116,7 +116,28 @@ def test_who_is_gone_is_waited_for_at_rest(world: Office, state: State) -> None:
         assert world.run(executive, to=State.PLANNING).state == State.PLANNING
     after = world.states[world.states.index(State.PAUSED) + 1]
     assert after == (State.RELEASE if state == State.CLEAR else State.LOOK)
-    assert executive.mission.account.seconds[State.PAUSED] == pytest.approx(2.0, abs=0.2)
+    assert executive.mission.account.seconds[State.PAUSED] == pytest.approx(2.0 + SETTINGS.pause_settle, abs=0.2)
+
+
+def test_who_is_back_and_gone_again_is_waited_for_anew(world: Office) -> None:
+    executive = executive_in(world)
+    back: list[float] = []
+
+    def gone() -> None:
+        executive.pause("sim_node is gone")
+        once(world, State.PAUSED, returns, after=1.0)
+
+    def returns() -> None:
+        executive.resume()
+        back.append(world.time)
+        if len(back) == 1:
+            once(world, State.PAUSED, gone, after=0.5 * SETTINGS.pause_settle)
+
+    once(world, State.NAVIGATE, gone, after=1.0)
+    for _ in range(2):
+        assert world.run(executive, to=State.PLANNING).state == State.PLANNING
+    left = next(change.time for change in executive.mission.account.log if change.event == Event.LINK_BACK)
+    assert len(back) == 2 and left - back[1] == pytest.approx(SETTINGS.pause_settle, abs=0.1)
 
 
 def test_who_never_comes_back_is_told_of(world: Office) -> None:

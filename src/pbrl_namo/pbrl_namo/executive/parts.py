@@ -81,7 +81,7 @@ class Parts:
             assert mission.planned.way is not None
             return DriveToGoal(mission.planned.way, view, self._controller.base, settings)
         if state == State.PAUSED:
-            return Paused(self._gone, settings.pause_timeout)
+            return Paused(self._gone, settings.pause_timeout, settings.pause_settle)
         if state in (State.DONE, State.FAILED, State.CANCELLED):
             return Resting(reason or "done", Phase.DONE if state == State.DONE else Phase.FAILED)
         return self._ask(state, now, mission)
@@ -126,26 +126,33 @@ class Parts:
 
 
 class Paused(BasePart):
-    """Rests until whoever is gone is back.
+    """Rests until whoever is gone is back, and until the robot stands.
 
     Args:
         gone: who is waited for, in words; empty: nobody any more.
         timeout: [s] at most.
+        settle: [s] that nobody is gone any more.
     """
 
-    def __init__(self, gone: Callable[[], str], timeout: float) -> None:
-        self._gone, self._timeout = gone, timeout
+    def __init__(self, gone: Callable[[], str], timeout: float, settle: float) -> None:
+        self._gone, self._timeout, self._settle = gone, timeout, settle
         self._since: float | None = None
+        self._back: float | None = None
 
     def step(self, now: float, percept: Percept) -> Step:
         """See `Part.step`."""
         self._since = now if self._since is None or now < self._since else self._since
         held, gone = still_held(percept), self._gone()
+        phase = Phase.SETTLE if held else Phase.LOCATE
         if not gone:
+            self._back = now if self._back is None or now < self._back else self._back
+            if now - self._back < self._settle:
+                return Step("whoever was gone is back: at rest first", None, phase)
             return Step(held, Event.STILL_HELD) if held else Step("whoever was gone is back", Event.LINK_BACK)
+        self._back = None
         if now - self._since > self._timeout:
             return Step(f"{gone}, for more than {self._timeout:.0f} s", Event.PAUSED_TOO_LONG)
-        return Step(f"waiting: {gone}", None, Phase.SETTLE if held else Phase.LOCATE)
+        return Step(f"waiting: {gone}", None, phase)
 
 
 def _without(scene: NamoScene, names: tuple[str, ...]) -> NamoScene:

@@ -69,6 +69,8 @@ class ExecutiveSettings(Section):
         hard_force: [N] at which a push ends whatever was expected.
         drive_timeout: [s] for the last way.
         pause_timeout: [s] at most at rest for something that was lost.
+        pause_settle: [s] that it stays at rest once that is back: who stood still meanwhile, a robot even, has yet to
+            brake.
         tries: of one object, without an opening, before it is left alone.
         plans: at most, for one goal.
         faults: at most, for one goal.
@@ -91,6 +93,7 @@ class ExecutiveSettings(Section):
     hard_force: Positive = 200.0
     drive_timeout: Positive = 180.0
     pause_timeout: Positive = 120.0
+    pause_settle: NotNegative = 0.3
     tries: Count = 3
     plans: Count = 30
     faults: Count = 5
