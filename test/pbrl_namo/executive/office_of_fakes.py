@@ -94,6 +94,7 @@ class Office(World):
         pinned: tables that do not move.
         stiffness: [N/m] of a grip on something that is pinned.
         strongest: [N] that such a grip feels at most.
+        slides: whether it slides along the edge at that force.
         closes: whether grippers do.
         opens: likewise.
     """
@@ -102,6 +103,7 @@ class Office(World):
     pinned: set[str] = field(default_factory=set)
     stiffness: float = STIFFNESS
     strongest: float = math.inf
+    slides: bool = False
     closes: bool = True
     opens: bool = True
     strain: dict[str, np.ndarray] = field(default_factory=dict)
@@ -198,6 +200,8 @@ class Office(World):
                 self.strain[side] = self.strain.get(side, np.zeros(2)) + step[:2]
                 force = self.stiffness * float(self.strain[side] @ inward)
                 self.forces[side] = -min(max(force, -self.strongest), self.strongest)
+                if self.slides and abs(force) >= self.strongest:
+                    hand[:2] += step[:2]
             else:
                 hand[:3] = compose(moved, hand[:3])
                 self.forces[side] = -math.copysign(self.friction, float(step[:2] @ inward))

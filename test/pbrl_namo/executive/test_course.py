@@ -113,7 +113,7 @@ SENTENCES = {
     "tag 'stall_a' was lost: last seen 1.2 s ago": Event.TAG_LOST,
     "tag 'time-out: ': expected a pose, got NaN or infinity": Event.TAG_LOST,
     "left gripper lost 'stall: unexpected force at ' 1.0 s into push": Event.GRIP_LOST,
-    "right grip on 'table': expected it to stay within 0.03 m of where it closed": Event.GRIP_LOST,
+    "right grip on 'table': expected it to stay within 0.03 m of where it closed": Event.GRIP_SLIPPED,
     "static object: moving it takes 900 N at least": None,
     "command: expected a finite twist": None,
     "": None,

@@ -145,14 +145,18 @@ def test_nobody_is_asked_where_nobody_is_to_be(world: Office) -> None:
 
 
 @pytest.mark.parametrize(
-    ("stiffness", "strongest", "state", "event"),
-    [(2000.0, 20.0, State.CLEAR, Event.STALLED), (20000.0, math.inf, State.GRASP, Event.UNEXPECTED_FORCE)],
+    ("stiffness", "strongest", "slides", "state", "event"),
+    [
+        (2000.0, 20.0, False, State.CLEAR, Event.STALLED),
+        (1000.0, 30.0, True, State.CLEAR, Event.GRIP_SLIPPED),
+        (20000.0, math.inf, False, State.GRASP, Event.UNEXPECTED_FORCE),
+    ],
 )
 def test_every_surprise_is_learned_from(
-    world: Office, stiffness: float, strongest: float, state: State, event: Event
+    world: Office, stiffness: float, strongest: float, slides: bool, state: State, event: Event
 ) -> None:
-    """Something stays where it is without much of a force; something is so fast that the test of the grip shows it."""
-    world.pinned, world.stiffness, world.strongest = {"table_a"}, stiffness, strongest
+    """Something stays where it is without much of a force, held or slipping, or is felt in the test of the grip."""
+    world.pinned, world.stiffness, world.strongest, world.slides = {"table_a"}, stiffness, strongest, slides
     brain = Brain(world)
     executive = executive_in(world, brain)
     world.run(executive, to=State.UPDATE_MODEL)

@@ -21,6 +21,8 @@ from pbrl_namo.executive.table import ENDED, State
 
 PATIENCE = 420.0
 """[s] of the wall clock for a mission to get to a state, or on its way again."""
+MISSES = 2
+"""Graphs, each with a seed of its own, whose mission may end before it gets to a state; one more is "state not met"."""
 DEAD = 1.5
 """[s] for which who is killed stays dead: longer than it takes others to notice."""
 ALONE = 1.5
@@ -87,20 +89,24 @@ def live(folder: Path, cases: Sequence[Case], seed: int) -> list[Outcome]:
         cases: in the order in which a mission gets there.
         seed: of simulator and executive.
     """
-    left, done, count = list(cases), list[Outcome](), 0
+    left, done, count, missed = list(cases), list[Outcome](), 0, 0
     while left:
-        outcomes = _one_graph(folder / f"graph_{count}", left, seed)
-        if not outcomes:  # a fresh graph did not get there either
+        outcomes, sentence = _one_graph(folder / f"graph_{count}", left, seed + missed)
+        count += 1
+        if not outcomes and missed < MISSES:  # a mission may end before that state, and another one meet it
+            missed += 1
+            continue
+        if not outcomes:
             case = left[0]
-            outcomes = [Outcome(case.number, case.state, "", case.node, case.way, False, None, NOT_MET, "", 0.0)]
+            outcomes = [Outcome(case.number, case.state, "", case.node, case.way, False, None, NOT_MET, sentence, 0.0)]
         done += outcomes
         left = left[len(outcomes) :]
-        count += 1
+        missed = 0
     return done
 
 
-def _one_graph(folder: Path, cases: Sequence[Case], seed: int) -> list[Outcome]:
-    """Do as many of the cases as one graph lets; the first of them at least, or none."""
+def _one_graph(folder: Path, cases: Sequence[Case], seed: int) -> tuple[list[Outcome], str]:
+    """Do as many of the cases as one graph lets, or none; return them, and what was told last."""
     folder.mkdir(parents=True)
     outcomes: list[Outcome] = []
     frozen: list[tuple[float, float]] = []
@@ -121,7 +127,7 @@ def _one_graph(folder: Path, cases: Sequence[Case], seed: int) -> list[Outcome]:
                 outcomes.append(_ended(case, life, str(error)))
                 break
     lost, found = lost_of(life, frozen)
-    return [replace(each, lost=lost, found=found) for each in outcomes]
+    return [replace(each, lost=lost, found=found) for each in outcomes], life.told[-1][2] if life.told else ""
 
 
 def _ended(case: Case, life: Life, sentence: str) -> Outcome:

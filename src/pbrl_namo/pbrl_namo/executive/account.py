@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pbrl_control.planar import Array
 from pbrl_namo.executive.table import MOVING, THINKING, Event, State
 
-SURPRISES = frozenset({Event.UNEXPECTED_FORCE, Event.STALLED, Event.TIMED_OUT})
+SURPRISES = frozenset({Event.UNEXPECTED_FORCE, Event.STALLED, Event.TIMED_OUT, Event.GRIP_SLIPPED})
 """What a model did not foretell."""
 
 FAILURES = SURPRISES | {

@@ -27,7 +27,7 @@ CAUSES: tuple[tuple[str, Event], ...] = (
     (r"lost tag: ", Event.TAG_LOST),
     (r"tag '.*' was lost: |tag '.*': ", Event.TAG_LOST),
     (r"(left|right) gripper lost ", Event.GRIP_LOST),
-    (r"(left|right) grip on '.*': ", Event.GRIP_LOST),
+    (r"(left|right) grip on '.*': ", Event.GRIP_SLIPPED),
 )
 """How a push or trajectory begins to say why it gives up, and which event that is; anything else is a fault."""
 

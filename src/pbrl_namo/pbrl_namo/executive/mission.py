@@ -192,7 +192,7 @@ class Mission:
             self.tries.failed(self.object, step.status)
         if step.event == Event.OPENED:
             self.tries.opened(self.object)
-        if step.event == Event.MISSED and self.grasp.candidate is not None:
+        if step.event in (Event.MISSED, Event.GRIP_SLIPPED) and self.grasp.candidate is not None:
             self.tries.missed(self.object, self.grasp.candidate.base_goal[:2])
         self.surprised = now
 

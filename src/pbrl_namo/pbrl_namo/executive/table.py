@@ -60,6 +60,7 @@ class Event(StrEnum):
     TIMED_OUT = "timed out"
     TAG_LOST = "tag lost"
     GRIP_LOST = "grip lost"
+    GRIP_SLIPPED = "grip slipped"
     UPDATED = "model updated"
     UNEXPLAINED = "model does not explain it"
     NOT_LEARNED = "nothing learned"
@@ -106,6 +107,8 @@ TABLE: Mapping[tuple[State, Event], State] = {
     (State.CLEAR, Event.UNEXPECTED_FORCE): State.UPDATE_MODEL,
     (State.CLEAR, Event.STALLED): State.UPDATE_MODEL,
     (State.CLEAR, Event.TIMED_OUT): State.UPDATE_MODEL,
+    # What is stuck may slip out of the plates at a force that is not unexpected yet, each time it is tried.
+    (State.CLEAR, Event.GRIP_SLIPPED): State.UPDATE_MODEL,
     (State.CLEAR, Event.TAG_LOST): State.RELEASE,
     (State.CLEAR, Event.GRIP_LOST): State.RELEASE,
     # Thesis 6.4: the object is let go after the model has been updated, and the policy recomputed.
