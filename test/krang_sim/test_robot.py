@@ -159,6 +159,27 @@ def test_a_hard_stop_leaves_the_slider_on_the_floor(stage):
     assert max(lowest) < 0.005
 
 
+def test_a_stop_of_everything_keeps_hands_on_their_way(stage):
+    """All joints and the base have the same share of their speeds left at any moment, and it ends with the slowest."""
+    speeds = np.array([0.3, -0.1, 0.2, 0.4, -0.3, 0.2, 0.8])
+    left = [JOINTS.index(f"LJ{k}") for k in range(1, 8)]
+    stage.robot.command_joints("LJ1", speeds)
+    stage.robot.command_base(-0.2, 0.0)
+    stage.run(0.8)
+    base = stage.robot.base_twist()[0]
+    stage.robot.command_joints("LJ1", np.zeros(7))
+    stage.robot.command_base(0.0, 0.0)
+    shares = []
+    for _ in range(10):
+        stage.run(0.01)
+        shares.append([*(stage.robot.joint_state()[1][left] / speeds), stage.robot.base_twist()[0] / base])
+    assert shares[0][0] > 0.9, "no jump"
+    assert np.ptp(shares, axis=1).max() < 0.08, "together"
+    assert 0.05 < shares[-1][3] < 0.3, "as fast as the fourth can: 0.4 rad/s at 190 degrees/s^2 take 0.12 s"
+    stage.run(0.06)
+    assert np.abs(stage.robot.joint_state()[1][left]).max() < 0.01
+
+
 def test_unknown_posture_names_the_nearest():
     with pytest.raises(KrangError, match="did you mean 'square_table_push'"):
         posture("square_table")

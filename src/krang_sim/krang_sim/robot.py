@@ -170,15 +170,21 @@ class Krang:
         )
 
     def _ramp(self, step: float) -> None:
-        change = self._base_change() * step
-        self._base_speed += np.clip(self._base_command - self._base_speed, -change, change)
+        limit = self.limits.velocity[2:]
+        wanted = np.clip(self._joint_command, -limit, limit)
+        base = self._base_change() * step
+        joints = JOINT_ACCELERATION * step * np.where(wanted == 0.0, JOINT_BRAKING, 1.0)
+        if self._base_command.any() or wanted.any():
+            self._base_speed += np.clip(self._base_command - self._base_speed, -base, base)
+            self._velocity[2:] += np.clip(wanted - self._velocity[2:], -joints, joints)
+        else:  # all stop at once, on the way that hands are on: what is held is not bent by who would stop sooner
+            slowest = max(np.abs(self._base_speed / base).max(), np.abs(self._velocity[2:] / joints).max())
+            left = max(1.0 - 1.0 / slowest, 0.0) if slowest > 0.0 else 0.0
+            self._base_speed *= left
+            self._velocity[2:] *= left
         v, w = self._base_speed
         self._velocity[0] = (v - w * TRACK / 2) / WHEEL_RADIUS
         self._velocity[1] = (v + w * TRACK / 2) / WHEEL_RADIUS
-        limit = self.limits.velocity[2:]
-        wanted = np.clip(self._joint_command, -limit, limit)
-        change = JOINT_ACCELERATION * step * np.where(wanted == 0.0, JOINT_BRAKING, 1.0)
-        self._velocity[2:] += np.clip(wanted - self._velocity[2:], -change, change)
         at_stop = self._at_stop(wanted)
         self._velocity[2:][at_stop] = 0.0
 

@@ -122,3 +122,11 @@ def notes_on(
         if apart:
             notes.append(f"the chains do not agree on {', '.join(apart)}: several explanations remain, or run longer")
     return tuple(notes)
+
+
+def note_on_unheard(count: int) -> tuple[str, ...]:
+    """Return what to know of holds, so many, that were under way when their force was first recorded."""
+    if not count:
+        return ()
+    holds = "a hold was" if count == 1 else f"{count} holds were"
+    return (f"{holds} under way when recording began, and left out: start recording a second before the grasp",)

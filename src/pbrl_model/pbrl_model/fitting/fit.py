@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_bag.episodes import cut_episodes
+from pbrl_bag.episodes import Episode, cut_episodes
 from pbrl_bag.types import BodyGeometry, Recording
 from pbrl_model.engines.windowed import PymunkEngine
 from pbrl_model.errors import ModelError
@@ -31,10 +31,17 @@ from pbrl_model.predict import UNKNOWN_MASS
 from pbrl_model.prior_options import PriorOptions
 from pbrl_model.priors import Prior, table2_prior
 from pbrl_model.sensing.checks import check_recording
-from pbrl_model.sensing.motion import Motion, observe
+from pbrl_model.sensing.motion import Motion, begun_unheard, observe
 from pbrl_model.sensing.wrench_error import wrench_error
 from pbrl_model.symmetry import wrap
-from pbrl_model.verdicts import note_on_delay, note_on_left_out, note_on_noise, note_on_wrench, notes_on
+from pbrl_model.verdicts import (
+    note_on_delay,
+    note_on_left_out,
+    note_on_noise,
+    note_on_unheard,
+    note_on_wrench,
+    notes_on,
+)
 
 __all__ = ["Fit", "FitOptions", "ObjectFit", "body_of", "fit_recording", "motions_of", "target_of"]
 
@@ -142,7 +149,7 @@ def fit_recording(recording: Recording, options: FitOptions | None = None) -> Fi
 def motions_of(
     recording: Recording, name: str, options: FitOptions | None = None, delay: float = 0.0
 ) -> tuple[Motion, ...]:
-    """Return the episodes of one object on one clock.
+    """Return the episodes of one object on one clock; but for holds that were under way when recording began.
 
     Args:
         recording: as read.
@@ -157,11 +164,7 @@ def motions_of(
     chosen = options or FitOptions()
     check_recording(recording, name)
     com = body_of(recording.bodies[name], _oriented(recording, name)).com
-    episodes = [episode for episode in cut_episodes(recording) if episode.object == name]
-    usable = [episode for episode in episodes if episode.duration >= SHORTEST]
-    if not usable:
-        longest = max((episode.duration for episode in episodes), default=0.0)
-        raise ModelError(f"{name}: expected an episode of at least {SHORTEST} s, got at most {longest:.3f} s")
+    usable = _heard(recording, _usable(recording, name))
     seen = [np.nan_to_num(np.hstack([each.poses.position, each.poses.quaternion])) for each in usable]
     if all((poses == poses[:1]).all() for poses in seen):
         raise ModelError(f"{name}: expected poses that change while it is held, got the same one all the time")
@@ -169,6 +172,21 @@ def motions_of(
         observe(recording, name, episode.grippers, episode.start, episode.end, com, gravity=chosen.gravity, delay=delay)
         for episode in usable
     )
+
+
+def _usable(recording: Recording, name: str) -> list[Episode]:
+    """Return the episodes of one object that last long enough; one at least."""
+    episodes = [episode for episode in cut_episodes(recording) if episode.object == name]
+    usable = [episode for episode in episodes if episode.duration >= SHORTEST]
+    if not usable:
+        longest = max((episode.duration for episode in episodes), default=0.0)
+        raise ModelError(f"{name}: expected an episode of at least {SHORTEST} s, got at most {longest:.3f} s")
+    return usable
+
+
+def _heard(recording: Recording, episodes: Sequence[Episode]) -> list[Episode]:
+    """Return the episodes whose forces were heard from the beginning; all, where none is: what is missing is said."""
+    return [each for each in episodes if not begun_unheard(recording, each)] or list(episodes)
 
 
 def _oriented(recording: Recording, name: str) -> bool:
@@ -229,7 +247,8 @@ def _fit_object(rng: np.random.Generator, recording: Recording, name: str, optio
         posterior = replace(posterior, heldout_rmse=heldout.after.rmse_position)
     noise = np.exp(found.position[..., target.simulated :])
     delay = found.position[..., target.simulated - 1]
-    notes = notes_on(posterior, target.prior, motions, rng) + note_on_noise(noise) + found.notes
+    notes = note_on_unheard(len(_usable(recording, name)) - len(motions))
+    notes += notes_on(posterior, target.prior, motions, rng) + note_on_noise(noise) + found.notes
     if target.likelihood.with_drag:
         notes += note_on_wrench(wrench_error(recording, motions, body))
         notes += note_on_left_out(noise, target.left_out_force) + note_on_delay(delay)

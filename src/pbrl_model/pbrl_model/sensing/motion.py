@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_bag.episodes import Episode
 from pbrl_bag.types import PoseStream, Recording, WrenchStream
 from pbrl_model.errors import ModelError
 from pbrl_model.sensing.clock import planar_yaw, smooth_gripper, step_means
@@ -132,6 +133,31 @@ def _grasp_of(recording: Recording, gripper: str, name: str, start: float) -> tu
     grasp = holding[-1]
     free_since = max((other.end for other in before if other.end <= grasp.start), default=-np.inf)
     return grasp.start, free_since, grasp.contact
+
+
+def begun_unheard(recording: Recording, episode: Episode) -> bool:
+    """Tell whether a gripper had closed before what it feels was recorded: a recording that begins amid a hold.
+
+    Args:
+        recording: as read.
+        episode: of it.
+
+    Raises:
+        ModelError: its grippers do not hold its object.
+    """
+    return any(
+        _closed_unheard(recording.wrenches[gripper], _grasp_of(recording, gripper, episode.object, episode.start)[0])
+        for gripper in episode.grippers
+        if gripper in recording.wrenches
+    )
+
+
+def _closed_unheard(stream: WrenchStream, closed: float) -> bool:
+    first, last = closed - REFERENCE_SPAN[0], closed - REFERENCE_SPAN[1]
+    if stream.exerted_on != "gripper":  # nothing is compensated
+        return bool(stream.time[0] > closed + LONGEST_GAP)
+    before = np.sum((stream.time >= first) & (stream.time <= last))
+    return bool(stream.time[0] > first and before < LEAST_READINGS)
 
 
 def _gripper_wrench(
