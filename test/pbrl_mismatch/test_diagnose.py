@@ -14,7 +14,7 @@ from concealed_cases import concealed
 from scipy.stats import kstest
 
 from pbrl_bag.types import Recording, WrenchStream
-from pbrl_mismatch import DiagnoseOptions, Diagnosis, MismatchError, diagnose
+from pbrl_mismatch import DiagnoseOptions, Diagnosis, MismatchError, diagnose, track_of
 from pbrl_mismatch.diagnose import least_of_two, with_library
 from pbrl_model.errors import ModelError
 
@@ -91,6 +91,21 @@ def test_a_clean_recording_is_clean(concealed_recording: Callable[..., Recording
     one = diagnose(concealed_recording("clean", 1), DiagnoseOptions(baseline=("free",), **QUICK)).objects["table"]
     assert not one.mismatch and not one.effects and not one.unknown
     assert "agree" in one.notes[0]
+
+
+def test_a_hold_that_was_under_way_when_recording_began_is_left_out_and_said(
+    concealed_recording: Callable[..., Recording], held_twice: Callable[..., Recording]
+) -> None:
+    first, second = (concealed_recording("clean", seed) for seed in (3, 1))
+    whole, late = held_twice(first, second, 40.0), held_twice(first, second, 40.0, heard_since=6.0)
+    assert track_of(whole, "table").unheard == 0
+    track = track_of(late, "table")
+    assert track.unheard == 1 and len(track.motions) == 1
+    assert track.clock[0] >= 40.0
+    options = DiagnoseOptions(without=without_all_but("viscous_drag"), baseline=("free",), **QUICK)
+    one = diagnose(late, options).objects["table"]
+    assert not one.mismatch
+    assert any("a hold was under way" in note and "start recording" in note for note in one.notes)
 
 
 def test_a_soft_hold_is_named_though_the_motion_does_not_show_it(concealed_recording: Callable[..., Recording]) -> None:

@@ -57,46 +57,15 @@ def test_another_push_is_predicted(make_recording: Maker, recording: Recording) 
     assert after.final_yaw < 0.2 * before.final_yaw
 
 
-def later(recording: Recording, time: float) -> Recording:
-    """Return the same, a time [s] later."""
-    return replace(
-        recording,
-        object_poses={name: replace(each, time=each.time + time) for name, each in recording.object_poses.items()},
-        gripper_poses={side: replace(each, time=each.time + time) for side, each in recording.gripper_poses.items()},
-        wrenches={side: replace(each, time=each.time + time) for side, each in recording.wrenches.items()},
-        grasps=tuple(replace(each, start=each.start + time, end=each.end + time) for each in recording.grasps),
-    )
-
-
-def poses_of_both(first: PoseStream, second: PoseStream) -> PoseStream:
-    return PoseStream(*(np.concatenate(each) for each in zip(vars(first).values(), vars(second).values(), strict=True)))
-
-
-def both(first: Recording, second: Recording, since: float) -> Recording:
-    """Return one recording after another, of which wrenches were heard only since some time [s]."""
-    early, late = first.wrenches["left"], second.wrenches["left"]
-    keep = early.time >= since
-    wrench = WrenchStream(
-        *(np.concatenate([getattr(early, name)[keep], getattr(late, name)]) for name in ("time", "force", "torque"))
-    )
-    return replace(
-        first,
-        object_poses={"table": poses_of_both(first.object_poses["table"], second.object_poses["table"])},
-        gripper_poses={"left": poses_of_both(first.gripper_poses["left"], second.gripper_poses["left"])},
-        wrenches={"left": wrench},
-        grasps=(*first.grasps, *second.grasps),
-    )
-
-
 def test_a_hold_that_was_under_way_when_recording_began_is_left_out_and_said(
-    make_recording: Maker, recording: Recording
+    make_recording: Maker, recording: Recording, held_twice: Maker
 ) -> None:
-    closed = recording.grasps[0].start
-    second = later(make_recording(3, seconds=9.0, rolling=6.0), 20.0)
-    whole, late = both(recording, second, -1.0), both(recording, second, closed + 5.0)
+    second = make_recording(3, seconds=9.0, rolling=6.0)
+    whole = held_twice(recording, second, 20.0)
+    late = held_twice(recording, second, 20.0, heard_since=recording.grasps[0].start + 5.0)
     assert len(motions_of(whole, "table")) == 2
     (left,) = motions_of(late, "table")
-    assert left.time[0] == second.grasps[0].start
+    assert left.time[0] == second.grasps[0].start + 20.0
     np.testing.assert_allclose(left.wrench, motions_of(whole, "table")[1].wrench, atol=1e-9)
     assert not any("under way" in note for note in fit_recording(whole, FitOptions(**QUICK)).objects["table"].notes)
     assert any(
@@ -105,9 +74,11 @@ def test_a_hold_that_was_under_way_when_recording_began_is_left_out_and_said(
 
 
 def test_where_every_hold_was_under_way_it_is_said_what_to_do(recording: Recording) -> None:
-    late = replace(recording, wrenches=both(recording, later(recording, 20.0), 2.0).wrenches)
+    wrench = recording.wrenches["left"]
+    keep = wrench.time >= 2.0
+    heard = replace(wrench, time=wrench.time[keep], force=wrench.force[keep], torque=wrench.torque[keep])
     with pytest.raises(ModelError, match="start recording earlier"):
-        motions_of(late, "table")
+        motions_of(replace(recording, wrenches={"left": heard}), "table")
 
 
 def test_report_is_the_contract_s(recording: Recording) -> None:

@@ -49,6 +49,7 @@ class Track:
         feet: (F, 2) points that carry the load.
         nominal_mass: [kg], NaN where it was not told.
         missing: stretches that are not to be believed; no window holds any of them.
+        unheard: so many more episodes were left out: under way when their force was first recorded.
     """
 
     object: str
@@ -65,6 +66,7 @@ class Track:
     feet: Array
     nominal_mass: float
     missing: tuple[Missing, ...] = ()
+    unheard: int = 0
 
     @property
     def dt(self) -> float:
