@@ -29,14 +29,16 @@ def test_a_state_is_waited_for_in_another_graph_with_another_seed(
         if left[0] == cases[0]:
             return [resumed(cases[0])], ""
         never = left[0] == cases[1] and second <= misses
-        return ([], "no way") if never else ([resumed(case) for case in left], "")
+        return ([], "Failed: no way") if never else ([resumed(case) for case in left], "")
 
     monkeypatch.setattr(striking, "_one_graph", one_graph)
     outcomes = live(tmp_path, cases, 7)
     assert [each.number for each in outcomes] == [case.number for case in cases]
     met = misses <= MISSES
     assert [each.mission for each in outcomes] == [RESUMED, RESUMED if met else NOT_MET, *[RESUMED] * (len(cases) - 2)]
-    assert outcomes[1].sentence == ("" if met else "no way")
+    assert outcomes[1].sentence == ("" if met else "Failed: no way")
+    assert outcomes[1].before == ("Failed: no way",) * min(misses, MISSES)
+    assert not any(each.before for each in (outcomes[0], *outcomes[2:]))
     assert len({name for name, _, _ in graphs}) == len(graphs)
     assert [seed for _, number, seed in graphs if number == cases[1].number] == [
         7 + k for k in range(min(misses, MISSES) + 1)

@@ -83,7 +83,10 @@ def _lived(out: Path, life: Sequence[Case], seed: int, count: int, *, begin: boo
 
 
 def rows_of(outcomes: Sequence[Outcome], count: int) -> list[Row]:
-    """Return the rows of acceptance for cases, of which there are to be so many."""
+    """Return the rows of acceptance for cases, of which there are to be so many.
+
+    Beside the first stands how missions ended that nothing was struck in: their state was met in another graph.
+    """
     struck = [each for each in outcomes if each.mission != NOT_MET]
     rests = [each for each in struck if each.rest is not None]
     slow = [each for each in rests if (each.rest or 0.0) > REST]
@@ -93,13 +96,14 @@ def rows_of(outcomes: Sequence[Outcome], count: int) -> list[Row]:
         for name in ("lost", "found")
     )
     states = Counter(each.state for each in struck)
+    before = Counter(f"before_{end.partition(':')[0]}" for each in outcomes for end in each.before)
     bad = {
         f"case {each.number}": f"{each.node} {each.way} in {each.state}: {each.sentence}"
         for each in struck
         if each.mission not in (RESUMED, REPORTED)
     }
     return [
-        at_least("nodes killed or frozen", len(struck), "1", count, not_met=len(outcomes) - len(struck)),
+        at_least("nodes killed or frozen", len(struck), "1", count, not_met=len(outcomes) - len(struck), **before),
         at_least("states in which that was", len(states), "1", min(len(STATES), count), **states),
         at_most(
             "longest until the robot rests, of those in which it moved",

@@ -27,6 +27,8 @@ DEAD = 1.5
 """[s] for which who is killed stays dead: longer than it takes others to notice."""
 ALONE = 1.5
 """[s] between a freeze and the death after it."""
+HEARS_AGAIN = 2.0
+"""[s] for which a graph goes on once its recorder is back: ended at once, it shows nothing of what comes after."""
 GOING = frozenset(
     {
         State.GET_GRASP_POINT,
@@ -65,6 +67,7 @@ class Outcome:
             None: there is none.
         found: of the same recordings, longest time in which recorder and simulator, one of them just started, did not
             know of each other [s]; None: there is none.
+        before: how missions ended, with other seeds, before they got to the state, none of them struck.
     """
 
     number: int
@@ -79,6 +82,7 @@ class Outcome:
     recovery: float
     lost: float | None = None
     found: float | None = None
+    before: tuple[str, ...] = ()
 
 
 def live(folder: Path, cases: Sequence[Case], seed: int) -> list[Outcome]:
@@ -89,24 +93,24 @@ def live(folder: Path, cases: Sequence[Case], seed: int) -> list[Outcome]:
         cases: in the order in which a mission gets there.
         seed: of simulator and executive.
     """
-    left, done, count, missed = list(cases), list[Outcome](), 0, 0
+    left, done, count, before = list(cases), list[Outcome](), 0, list[str]()
     while left:
-        outcomes, sentence = _one_graph(folder / f"graph_{count}", left, seed + missed)
+        outcomes, sentence = _one_graph(folder / f"graph_{count}", left, seed + len(before))
         count += 1
-        if not outcomes and missed < MISSES:  # a mission may end before that state, and another one meet it
-            missed += 1
+        if not outcomes and len(before) < MISSES:  # a mission may end before that state, and another one meet it
+            before.append(sentence)
             continue
         if not outcomes:
             case = left[0]
             outcomes = [Outcome(case.number, case.state, "", case.node, case.way, False, None, NOT_MET, sentence, 0.0)]
-        done += outcomes
+        done += [replace(outcomes[0], before=tuple(before)), *outcomes[1:]]
         left = left[len(outcomes) :]
-        missed = 0
+        before = []
     return done
 
 
 def _one_graph(folder: Path, cases: Sequence[Case], seed: int) -> tuple[list[Outcome], str]:
-    """Do as many of the cases as one graph lets, or none; return them, and what was told last."""
+    """Do as many of the cases as one graph lets, or none; return them, and how its mission ended, or stands."""
     folder.mkdir(parents=True)
     outcomes: list[Outcome] = []
     frozen: list[tuple[float, float]] = []
@@ -127,7 +131,8 @@ def _one_graph(folder: Path, cases: Sequence[Case], seed: int) -> tuple[list[Out
                 outcomes.append(_ended(case, life, str(error)))
                 break
     lost, found = lost_of(life, frozen)
-    return [replace(each, lost=lost, found=found) for each in outcomes], life.told[-1][2] if life.told else ""
+    end = f"{life.state}: {life.told[-1][2]}" if life.told else ""
+    return [replace(each, lost=lost, found=found) for each in outcomes], end
 
 
 def _ended(case: Case, life: Life, sentence: str) -> Outcome:
@@ -185,6 +190,8 @@ def _blow(life: Life, case: Case, frozen: list[tuple[float, float]]) -> float:
         life.start(case.node)
         if case.node == "recorder":
             life.under_way()
+    if case.node == "recorder":
+        life.wait(HEARS_AGAIN)
     return struck
 
 
