@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_bag.episodes import cut_episodes
 from pbrl_bag.types import Recording
 from pbrl_mismatch.data.grip import GripTrack, lay_grips
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
@@ -35,7 +34,7 @@ from pbrl_mismatch.search.predictive import Verdict, predictive_test
 from pbrl_mismatch.search.told_baseline import ToldBaseline, baseline_from_model
 from pbrl_mismatch.search.weigh import Weighed
 from pbrl_mismatch.unknown.describe import describe_unknown
-from pbrl_model.fitting.fit import SHORTEST, body_of, motions_of
+from pbrl_model.fitting.fit import body_of, motions_of, usable_episodes
 from pbrl_model.predict import UNKNOWN_MASS
 from pbrl_model.sensing.wrench_error import wrench_error
 from pbrl_model.verdicts import note_on_unheard
@@ -162,8 +161,8 @@ def track_of(recording: Recording, name: str) -> Track:
         raise MismatchError(f"{name}: expected a force while it was held, got zero throughout; was the sensor on?")
     geometry = recording.bodies[name]
     laid = lay_track(sound.recording, motions, geometry, body_of(geometry, motions[0].oriented))
-    usable = [each for each in cut_episodes(sound.recording) if each.object == name and each.duration >= SHORTEST]
-    track = replace(laid, missing=sound.missing, unheard=len(usable) - len(motions))
+    unheard = len(usable_episodes(sound.recording, name)) - len(motions)
+    track = replace(laid, missing=sound.missing, unheard=unheard)
     check_track(track)
     return track
 

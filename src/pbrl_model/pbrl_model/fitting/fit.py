@@ -164,7 +164,7 @@ def motions_of(
     chosen = options or FitOptions()
     check_recording(recording, name)
     com = body_of(recording.bodies[name], _oriented(recording, name)).com
-    usable = _heard(recording, _usable(recording, name))
+    usable = _heard(recording, usable_episodes(recording, name))
     seen = [np.nan_to_num(np.hstack([each.poses.position, each.poses.quaternion])) for each in usable]
     if all((poses == poses[:1]).all() for poses in seen):
         raise ModelError(f"{name}: expected poses that change while it is held, got the same one all the time")
@@ -174,8 +174,13 @@ def motions_of(
     )
 
 
-def _usable(recording: Recording, name: str) -> list[Episode]:
-    """Return the episodes of one object that last long enough; one at least."""
+def usable_episodes(recording: Recording, name: str) -> list[Episode]:
+    """Return the episodes of one object that last long enough; `motions_of` leaves those out that were not heard whole.
+
+    Raises:
+        ModelError: there is none.
+        BagError: an episode is malformed.
+    """
     episodes = [episode for episode in cut_episodes(recording) if episode.object == name]
     usable = [episode for episode in episodes if episode.duration >= SHORTEST]
     if not usable:
@@ -247,7 +252,7 @@ def _fit_object(rng: np.random.Generator, recording: Recording, name: str, optio
         posterior = replace(posterior, heldout_rmse=heldout.after.rmse_position)
     noise = np.exp(found.position[..., target.simulated :])
     delay = found.position[..., target.simulated - 1]
-    notes = note_on_unheard(len(_usable(recording, name)) - len(motions))
+    notes = note_on_unheard(len(usable_episodes(recording, name)) - len(motions))
     notes += notes_on(posterior, target.prior, motions, rng) + note_on_noise(noise) + found.notes
     if target.likelihood.with_drag:
         notes += note_on_wrench(wrench_error(recording, motions, body))
