@@ -14,7 +14,7 @@ from pbrl_bringup.clouds import ellipse
 from pbrl_bringup.replay import AHEAD, Replay, replay
 from pbrl_bringup.report_build import object_report, whole_report
 from pbrl_bringup.report_data import ObjectReport
-from pbrl_model.fitting.fit import motions_of
+from pbrl_model.fitting.episodes import motions_of
 from pbrl_model.geometry import mass_properties
 from pbrl_model.posterior import Posterior
 

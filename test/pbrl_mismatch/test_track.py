@@ -12,7 +12,7 @@ from pbrl_bag.types import Recording
 from pbrl_mismatch import MismatchError, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.track import CLOSING, ROLLING, after_closing, lay_track
-from pbrl_model.fitting.fit import body_of, motions_of
+from pbrl_model.fitting.episodes import body_of, motions_of
 from pbrl_model.sensing.motion import Motion
 
 

@@ -29,7 +29,7 @@ from pbrl_bringup.report_build import object_report, whole_report
 from pbrl_bringup.report_data import Point, Report
 from pbrl_bringup.report_page import write_page
 from pbrl_bringup.ros.client import GraphClient, Heard
-from pbrl_model.fitting.fit import motions_of
+from pbrl_model.fitting.episodes import motions_of
 from pbrl_model.geometry import mass_properties
 from pbrl_model.posterior import Posterior
 from pbrl_model.ros.conversions import models_from_msg

@@ -34,7 +34,7 @@ from pbrl_mismatch.search.predictive import Verdict, predictive_test
 from pbrl_mismatch.search.told_baseline import ToldBaseline, baseline_from_model
 from pbrl_mismatch.search.weigh import Weighed
 from pbrl_mismatch.unknown.describe import describe_unknown
-from pbrl_model.fitting.fit import body_of, motions_of, usable_episodes
+from pbrl_model.fitting.episodes import body_of, motions_of, usable_episodes
 from pbrl_model.predict import UNKNOWN_MASS
 from pbrl_model.sensing.wrench_error import wrench_error
 from pbrl_model.verdicts import note_on_unheard

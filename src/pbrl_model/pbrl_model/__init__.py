@@ -1,7 +1,8 @@
 """The world model: pymunk world, compiled kernel, priors, likelihood, inference; model_node."""
 
 from pbrl_model.errors import ModelError
-from pbrl_model.fitting.fit import Fit, ObjectFit, fit_recording, motions_of
+from pbrl_model.fitting.episodes import motions_of
+from pbrl_model.fitting.fit import Fit, ObjectFit, fit_recording
 from pbrl_model.fitting.options import FitOptions
 from pbrl_model.parameters import BodyParameters
 from pbrl_model.posterior import Posterior

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from pbrl_bag.types import Recording
-from pbrl_model.fitting.fit import FitOptions, ObjectFit, fit_recording, motions_of
+from pbrl_model.fitting.episodes import motions_of
+from pbrl_model.fitting.fit import FitOptions, ObjectFit, fit_recording
 from pbrl_model.verdicts import note_on_delay
 
 Maker = Callable[..., Recording]

@@ -13,7 +13,8 @@ import pytest
 
 from pbrl_bag.types import BodyGeometry, Grasp, PoseStream, Recording, WrenchStream
 from pbrl_model.errors import ModelError
-from pbrl_model.fitting.fit import FitOptions, fit_recording, motions_of
+from pbrl_model.fitting.episodes import motions_of
+from pbrl_model.fitting.fit import FitOptions, fit_recording
 from pbrl_model.parameters import BodyParameters, free_columns
 from pbrl_model.predict import path_error, predict, predict_windows, unlearned
 from pbrl_model.sensing.windows import whole_windows

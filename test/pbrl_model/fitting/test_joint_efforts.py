@@ -13,7 +13,8 @@ from pbrl_bag import Recording
 from pbrl_bag.joint_efforts import JointSamples, wrench_from_efforts
 from pbrl_bag.joint_efforts.stream import arm_of
 from pbrl_bag.mapping import EffortSource
-from pbrl_model.fitting.fit import FitOptions, body_of, fit_recording, motions_of
+from pbrl_model.fitting.episodes import body_of, motions_of
+from pbrl_model.fitting.fit import FitOptions, fit_recording
 from pbrl_model.sensing.wrench_error import wrench_error
 
 URDF = (Path(__file__).resolve().parents[3] / "urdf" / "krang" / "krang.urdf").read_text()

@@ -10,7 +10,7 @@ import pytest
 
 from pbrl_bag.types import Grasp, Recording, WrenchStream
 from pbrl_model.errors import ModelError
-from pbrl_model.fitting.fit import motions_of
+from pbrl_model.fitting.episodes import motions_of
 from pbrl_model.fitting.likelihood import WindowedLikelihood
 from pbrl_model.geometry import mass_properties
 from pbrl_model.online.windows import (

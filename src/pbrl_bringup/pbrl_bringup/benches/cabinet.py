@@ -14,7 +14,8 @@ from pbrl_bringup.benches.rows import Measured, at_most, within
 from pbrl_bringup.diagnosis.door_figures import side_by_side
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.paths import config_file, workspace
-from pbrl_model.fitting.fit import FitOptions, ObjectFit, fit_recording, motions_of
+from pbrl_model.fitting.episodes import motions_of
+from pbrl_model.fitting.fit import FitOptions, ObjectFit, fit_recording
 from pbrl_model.predict import predict, unlearned
 
 Array = NDArray[np.float64]

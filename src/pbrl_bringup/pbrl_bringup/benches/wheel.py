@@ -18,7 +18,8 @@ from pbrl_bringup.errors import BringupError
 from pbrl_bringup.parallel import in_parallel
 from pbrl_bringup.simulate import simulate_push
 from pbrl_control.push_plan import PushPlan, Segment, load_plan
-from pbrl_model.fitting.fit import FitOptions, ObjectFit, fit_recording, motions_of
+from pbrl_model.fitting.episodes import motions_of
+from pbrl_model.fitting.fit import FitOptions, ObjectFit, fit_recording
 from pbrl_model.predict import path_error, predict_windows, unlearned
 from pbrl_model.sensing.windows import whole_windows
 

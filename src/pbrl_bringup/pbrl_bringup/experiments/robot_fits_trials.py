@@ -18,7 +18,8 @@ from pbrl_bringup.errors import BringupError
 from pbrl_bringup.simulate import simulate_push
 from pbrl_control.planar import placed
 from pbrl_control.push_plan import load_plan
-from pbrl_model.fitting.fit import FitOptions, fit_recording, motions_of
+from pbrl_model.fitting.episodes import motions_of
+from pbrl_model.fitting.fit import FitOptions, fit_recording
 from pbrl_model.geometry import MassProperties, mass_properties
 from pbrl_model.posterior import Posterior
 from pbrl_model.predict import predict, unlearned

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pbrl_bag.types import Recording
 from pbrl_mismatch.errors import MismatchError
-from pbrl_model.fitting.fit import motions_of
+from pbrl_model.fitting.episodes import motions_of
 from pbrl_model.fitting.guesses import circle
 from pbrl_model.sensing.motion import Motion
 

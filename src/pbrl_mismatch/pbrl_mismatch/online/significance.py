@@ -18,7 +18,7 @@ from pbrl_mismatch.online.slices import between
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.predictive import predictive_test
-from pbrl_model.fitting.fit import body_of, motions_of
+from pbrl_model.fitting.episodes import body_of, motions_of
 from pbrl_model.posterior import Posterior
 
 WINDOW = 2.0

@@ -11,7 +11,7 @@ from pbrl_bag.types import Recording
 from pbrl_mismatch.data.cuts import Cuts, cut_windows
 from pbrl_mismatch.data.track import lay_track
 from pbrl_mismatch.online.options import MonitorOptions
-from pbrl_model.fitting.fit import body_of
+from pbrl_model.fitting.episodes import body_of
 from pbrl_model.online.windows import TINY, Hold, holds_of, known_until, trimmed
 from pbrl_model.sensing.motion import Motion, observe
 from pbrl_model.sensing.windows import WIDENING

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pbrl_bag.types import BodyGeometry
 from pbrl_model.errors import ModelError
+from pbrl_model.fitting import episodes
 from pbrl_model.fitting import fit as at_once
 from pbrl_model.fitting.fit import FitOptions, ObjectFit
 from pbrl_model.fitting.heldout import split
@@ -116,7 +117,7 @@ def adopted(found: ObjectFit, geometry: BodyGeometry, options: OnlineOptions) ->
 
 def body_of(learned: Learned) -> MassProperties:
     """Return mass properties; a body of unknown orientation is taken as the point that is observed."""
-    return at_once.body_of(learned.geometry, learned.oriented)
+    return episodes.body_of(learned.geometry, learned.oriented)
 
 
 def target_of(learned: Learned, windows: Windows, fit: FitOptions) -> Target:

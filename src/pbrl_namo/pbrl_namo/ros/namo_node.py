@@ -28,6 +28,7 @@ from visualization_msgs.msg import MarkerArray
 
 from pbrl_bag.names import relative
 from pbrl_bag.ros.diagnostics import Diagnostics
+from pbrl_bag.ros.liveness import Liveness
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
 from pbrl_bag.ros.stopping import spin_in_order
@@ -50,7 +51,6 @@ from pbrl_namo.executive.table import ENDED
 from pbrl_namo.ros.conversions import belief_from_msg, goal_from_pose, goal_from_text, masses_from_msg, status_to_msg
 from pbrl_namo.ros.goal_server import GoalServer
 from pbrl_namo.ros.hearing import JOINT_STATES, SHARE, Hearing
-from pbrl_namo.ros.liveness import Liveness
 from pbrl_namo.ros.markers import Drawing, draw
 from pbrl_namo.ros.thinker import NodeThinker
 

@@ -18,6 +18,7 @@ from tf2_msgs.msg import TFMessage
 from pbrl_bag.errors import BagError
 from pbrl_bag.geometry import bodies_of_scene
 from pbrl_bag.ros.diagnostics import Diagnostics
+from pbrl_bag.ros.liveness import Liveness
 from pbrl_control.ball_arm import JOINTS, BallArm, Strokes
 from pbrl_control.errors import ControlError
 from pbrl_control.planar import Array
@@ -35,6 +36,8 @@ PICTURES = QoSProfile(depth=2, reliability=ReliabilityPolicy.BEST_EFFORT)
 WORLD, BASE = "world", "arm_base"
 POSES_WITHIN = 0.3
 """[s] in which the poses of all items have to come to count as one look."""
+SILENT = 2.0
+"""Without the arm's joints for so long [s] nothing is moved any more."""
 SAID = 5.0
 """[s] between two warnings of the same kind."""
 
@@ -52,13 +55,13 @@ class DeskHearing:
 
     Attributes:
         joints: (4,) where the arm is [rad]; None: not heard yet.
-        heard: when that was, by the node's clock [s].
+        live: whether the arm is still heard; asked at every tick of the node.
     """
 
     def __init__(self, node: Node, diagnostics: Diagnostics, camera: str, look: Look) -> None:
         self._node, self._camera, self._look = node, camera, look
         self.joints: Array | None = None
-        self.heard = -math.inf
+        self.live = Liveness(("/joint_states",), SILENT)
         self._description: str | None = None
         self._scene: Scene | None = None
         self._places: dict[str, Transform] = {}
@@ -141,8 +144,11 @@ class DeskHearing:
     def _on_joints(self, message: JointState) -> None:
         table = dict(zip(message.name, message.position, strict=False))
         if all(name in table for name in JOINTS):
+            now = self._node.get_clock().now().nanoseconds * 1e-9
+            if self.joints is None:
+                self.live.begin(now)
+            self.live.heard("/joint_states", now)
             self.joints = np.array([table[name] for name in JOINTS])
-            self.heard = self._node.get_clock().now().nanoseconds * 1e-9
 
     def _on_info(self, message: CameraInfo) -> None:
         self._info = message

@@ -49,8 +49,6 @@ from pbrl_planner.tabletop import (
 
 TICK = 0.01
 """[s] of the node's clock."""
-SILENT = 2.0
-"""Without the arm's joints for so long [s] nothing is moved any more."""
 OUTPUT = "ball_arm_position_controller/commands"
 
 
@@ -147,12 +145,12 @@ class TabletopNode(Node):
             self._executive.see(stamp, poses, len(self._hearing.desk().items))
 
     def _tick(self) -> None:
-        executive, joints = self._executive, self._hearing.joints
+        executive, joints, now = self._executive, self._hearing.joints, self._now()
+        complaint = self._hearing.live.complaint(now)
         if executive is None or joints is None:
             return
-        now = self._now()
-        if executive.task is not None and now > self._hearing.heard + SILENT:
-            executive.halt(Ended(Ending.SILENT, f"nothing on /joint_states for {SILENT:.0f} s; is the robot running?"))
+        if executive.task is not None and complaint:
+            executive.halt(Ended(Ending.SILENT, f"{complaint}; is the robot running?"))
         self._think_or_answer(executive, now, joints)
         angles = executive.tick(now, joints)
         if angles is not None:
