@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -171,18 +172,29 @@ class Life:
         end = time.time() + seconds
         self.until(lambda: time.time() >= end, seconds + STARTED, "the clock stands still")
 
-    def reach(self, state: State, timeout: float) -> bool:
-        """Wait until a state is told of; return whether it is, before the mission ends otherwise."""
+    def reach(self, state: State, still: float, longest: float) -> bool:
+        """Wait until a state is told of; return whether it is, before the mission ends or `longest` [s] is over.
+
+        Raises:
+            BringupError: the mission stands still, in one state for `still` [s]; or a node has ended by itself.
+        """
         if self._room == CALLED_OFF and self.state != state:
-            self._be_called_off(timeout)
+            self._be_called_off(still)
         since = len(self.told) - 1 if self.state == state else len(self.told)
+        end = time.monotonic() + longest
+
+        def states() -> list[State]:
+            return [each[1] for each in self.told[since:]]
 
         def decided() -> bool:
-            states = [each[1] for each in self.told[since:]]
-            return state in states or any(each in ENDED for each in states)
+            return state in states() or any(each in ENDED for each in states()) or time.monotonic() > end
 
-        self.until(decided, timeout, f"no {state}")
-        return state in [each[1] for each in self.told[since:]]
+        def moved_on(before: State | None) -> bool:
+            return decided() or self.state != before
+
+        while not decided():
+            self.until(partial(moved_on, self.state), still, f"no {state}: still {self.state or 'nothing'}")
+        return state in states()
 
     def _be_called_off(self, timeout: float) -> None:
         """Set out, and call it off as soon as something is held."""

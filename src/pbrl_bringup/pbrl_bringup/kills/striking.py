@@ -20,9 +20,12 @@ from pbrl_bringup.kills.truth import WALL, Array, moves, read_truth, time_to_res
 from pbrl_namo.executive.table import ENDED, State
 
 PATIENCE = 420.0
-"""[s] of the wall clock for a mission to get to a state, or on its way again."""
+"""[s] of the wall clock in one state, after which a mission stands still; or to be on its way again."""
+LONGEST = 900.0
+"""[s] of the wall clock for a mission that does not stand still to get to a state."""
 MISSES = 2
-"""Graphs, each with a seed of its own, whose mission may end before it gets to a state; one more is "state not met"."""
+"""Graphs, each with a seed of its own, whose mission may not get to a state, because it ends before or takes too long;
+one more is "state not met"."""
 DEAD = 1.5
 """[s] for which who is killed stays dead: longer than it takes others to notice."""
 ALONE = 1.5
@@ -67,7 +70,7 @@ class Outcome:
             None: there is none.
         found: of the same recordings, longest time in which recorder and simulator, one of them just started, did not
             know of each other [s]; None: there is none.
-        before: how missions ended, with other seeds, before they got to the state, none of them struck.
+        before: how missions ended or stood, with other seeds, that did not get to the state, none of them struck.
     """
 
     number: int
@@ -97,7 +100,7 @@ def live(folder: Path, cases: Sequence[Case], seed: int) -> list[Outcome]:
     while left:
         outcomes, sentence = _one_graph(folder / f"graph_{count}", left, seed + len(before))
         count += 1
-        if not outcomes and len(before) < MISSES:  # a mission may end before that state, and another one meet it
+        if not outcomes and len(before) < MISSES:  # a mission may not get to that state, and another one meet it
             before.append(sentence)
             continue
         if not outcomes:
@@ -117,7 +120,7 @@ def _one_graph(folder: Path, cases: Sequence[Case], seed: int) -> tuple[list[Out
     with Life(folder, cases[0].room, seed) as life:
         for case in cases:
             try:
-                met = life.reach(State.CLEAR if case.state == State.PAUSED else case.state, PATIENCE)
+                met = life.reach(State.CLEAR if case.state == State.PAUSED else case.state, PATIENCE, LONGEST)
             except BringupError as error:
                 if outcomes:
                     break
@@ -158,6 +161,8 @@ def _strike(life: Life, case: Case, frozen: list[tuple[float, float]]) -> Outcom
     back = time.time()
     if helper:
         life.strike(helper, signal.SIGCONT)
+    if case.node == "recorder":
+        life.wait(HEARS_AGAIN)
     rows = read_truth(truth)
     must_rest = case.node != "recorder" and not (case.node == "sim" and case.way != FREEZE)
     moved = must_rest and moves(rows, struck)
@@ -190,8 +195,6 @@ def _blow(life: Life, case: Case, frozen: list[tuple[float, float]]) -> float:
         life.start(case.node)
         if case.node == "recorder":
             life.under_way()
-    if case.node == "recorder":
-        life.wait(HEARS_AGAIN)
     return struck
 
 
