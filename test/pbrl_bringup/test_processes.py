@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -127,3 +128,17 @@ def test_who_is_not_missed_is_let_go_once_and_the_others_go_on(tmp_path: Path) -
         assert programs.let_go({"spare"}) == []
         programs.check()
         assert programs.names == ("needed",)
+
+
+def test_who_is_struck_is_the_node_of_that_very_name(tmp_path: Path) -> None:
+    with Programs(tmp_path) as programs:
+        struck, left = (
+            programs.start(name, [*python(PATIENT), "-r", f"__node:={name}"]).process for name in ("sim", "sim_2")
+        )
+        programs.strike("sim", signal.SIGSTOP)
+        assert os.WIFSTOPPED(os.waitpid(struck.pid, os.WUNTRACED)[1])
+        assert psutil.Process(left.pid).status() != psutil.STATUS_STOPPED
+        programs.strike("sim", signal.SIGKILL)
+        assert struck.wait(10.0) == -signal.SIGKILL
+        programs.strike("sim", signal.SIGKILL)  # is gone
+        assert left.poll() is None

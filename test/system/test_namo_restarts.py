@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
-import psutil
 import pytest
 import rclpy
 from namo_person import Person
@@ -35,9 +35,7 @@ class Graph:
 
     def kill(self, name: str) -> int:
         """Kill a node, as a crash would; return how much had been told until then."""
-        for process in psutil.Process().children(recursive=True):
-            if f"__node:={name}" in process.cmdline():
-                process.kill()
+        self._programs.strike(name, signal.SIGKILL)
         self._programs.stop(name)
         return len(self.person.told)
 

@@ -18,6 +18,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import psutil
+
 from pbrl_bringup.errors import BringupError
 
 PR_SET_PDEATHSIG = 1
@@ -110,6 +112,18 @@ class Programs:
             code = program.process.poll()
             if code is not None:
                 raise BringupError(f"{program.name} ended with exit code {code}: {program.last_line()}")
+
+    def strike(self, name: str, number: signal.Signals) -> float:
+        """Send a signal to every process of the node of a name, as a crash or a debugger would; return when [s].
+
+        It is the node's own name that counts, as its command line gives it. Who is gone by then is left alone.
+        """
+        when = time.time()
+        for process in psutil.Process().children(recursive=True):
+            with suppress(psutil.Error):
+                if f"__node:={name}" in process.cmdline():
+                    process.send_signal(number)
+        return when
 
     def ended(self, name: str, timeout: float) -> bool:
         """Wait for a program to end by itself; tell whether it did within `timeout` seconds."""

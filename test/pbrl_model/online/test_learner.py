@@ -26,6 +26,8 @@ MANY = 600
 TIMES = np.arange(3.0, 13.0, 0.75).tolist()
 COMPARED = ("mass", "wheel_x", "wheel_y", "mu_ground")
 SECONDS = 9.3
+WHOLE = 9.0
+"""[s] of six whole windows, for both the same: over 9.3 s, other windows alone move a mean by 1.3 deviations."""
 
 
 @pytest.fixture(scope="module")
@@ -51,13 +53,14 @@ def deviations(posterior: Posterior) -> dict[str, float]:
     return dict(zip(posterior.names, posterior.sd().tolist(), strict=True))
 
 
-def test_in_the_end_it_says_what_a_fit_at_once_says(recording: Recording, heard_by: HeardBy) -> None:
+def test_in_the_end_it_says_what_a_fit_at_once_says(make_recording: Maker, heard_by: HeardBy) -> None:
+    recording = make_recording(0, seconds=WHOLE, rolling=6.0)
     at_once = fit_recording(recording, FitOptions(holdout_share=0.0)).objects["table"].posterior
     last = fed(recording, heard_by, replace(OPTIONS, particles=MANY), TIMES)[-1]
     spread, other = deviations(last), deviations(at_once)
     for name in COMPARED:
         difference = abs(float(last.column(name).mean() - at_once.column(name).mean()))
-        assert difference < 1.5 * other[name], name
+        assert difference < 1.2 * other[name], name
         assert 0.5 < spread[name] / other[name] < 2.0, name
     assert last.log_evidence == pytest.approx(at_once.log_evidence, rel=0.05)
 

@@ -13,7 +13,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import psutil
 from action_msgs.srv import CancelGoal
 from geometry_msgs.msg import Pose2D
 from pbrl_msgs.action import ReachGoal
@@ -102,18 +101,9 @@ class Life:
         self.until(lambda: sum(file.stat().st_size for file in bag.glob("*.mcap")) > SETTLED, STARTED, "no recording")
         self.bags.append((bag, time.time(), float("inf")))
 
-    def strike(self, name: str, number: signal.Signals) -> float:
-        """Send a signal to every process of a node; return when [s]."""
-        when = time.time()
-        for process in psutil.Process().children(recursive=True):
-            with suppress(psutil.Error):
-                if f"__node:={name}" in process.cmdline():
-                    os.kill(process.pid, number)
-        return when
-
     def bury(self, name: str) -> float:
         """Kill a node, as a crash would, and clear it away; return when [s]."""
-        when = self.strike(name, signal.SIGKILL)
+        when = self.programs.strike(name, signal.SIGKILL)
         if name == "recorder":
             bag, begun, _ = self.bags[-1]
             self.bags[-1] = (bag, begun, when)

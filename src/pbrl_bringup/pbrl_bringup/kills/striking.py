@@ -148,7 +148,7 @@ def _strike(life: Life, case: Case, frozen: list[tuple[float, float]]) -> Outcom
     helper = ""
     if case.state == State.PAUSED:  # somebody else is gone first
         helper = "controller" if case.node != "controller" else "sim"
-        life.strike(helper, signal.SIGSTOP)
+        life.programs.strike(helper, signal.SIGSTOP)
         since = len(life.told)
         life.until(lambda: State.PAUSED in [each[1] for each in life.told[since:]], PATIENCE, "not paused")
     else:
@@ -160,7 +160,7 @@ def _strike(life: Life, case: Case, frozen: list[tuple[float, float]]) -> Outcom
     struck = _blow(life, case, frozen)
     back = time.time()
     if helper:
-        life.strike(helper, signal.SIGCONT)
+        life.programs.strike(helper, signal.SIGCONT)
     if case.node == "recorder":
         life.wait(HEARS_AGAIN)
     rows = read_truth(truth)
@@ -182,13 +182,13 @@ def _blow(life: Life, case: Case, frozen: list[tuple[float, float]]) -> float:
         struck = life.bury(case.node)
         life.wait(DEAD)
     else:
-        struck = life.strike(case.node, signal.SIGSTOP)
+        struck = life.programs.strike(case.node, signal.SIGSTOP)
         life.wait(case.frozen if case.way == FREEZE else ALONE)
         if case.way == BURY:
             life.bury(case.node)
             life.wait(DEAD)
     if case.way == FREEZE:
-        life.strike(case.node, signal.SIGCONT)
+        life.programs.strike(case.node, signal.SIGCONT)
     if case.node in ("recorder", "sim"):
         frozen.append((struck, time.time()))
     if case.way != FREEZE:
