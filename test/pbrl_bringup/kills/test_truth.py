@@ -57,12 +57,21 @@ def test_a_file_whose_last_row_was_cut_off_is_read_up_to_there(tmp_path: Path) -
 def test_what_is_missing_is_the_longest_stretch_but_for_what_was_frozen() -> None:
     truth = np.arange(0.0, 20.0, 0.01)
     heard = truth[(truth < 4.0) | ((truth > 6.0) & (truth < 12.0))]
+    seen = truth[truth < 12.0]
     assert _missing(truth, heard, []) == pytest.approx(8.0, abs=0.05)
-    assert _missing(truth[truth < 12.0], heard, []) == pytest.approx(1.0, abs=0.05), "to the nearest that was heard"
-    assert _missing(truth[truth < 12.0], heard, [(4.0, 6.0)]) < 0.05
-    assert _missing(truth[truth < 12.0], heard, [(4.0, 5.5)]) == pytest.approx(0.5), "who is back has to hear again"
+    assert _missing(seen, heard, []) == pytest.approx(2.0, abs=0.05), "the whole of a gap"
+    assert _missing(seen, heard, [(4.0, 6.0)]) < 0.05
+    assert _missing(seen, heard, [(4.0, 5.5)]) == pytest.approx(0.5, abs=0.02), "who is back has to hear again"
+    assert _missing(seen, heard, [(4.5, 5.5)]) == pytest.approx(1.0, abs=0.04), "before it and after it"
+    assert _missing(seen, heard, [(4.4, 4.8), (5.0, 5.2)]) == pytest.approx(1.4, abs=0.06)
+    assert _missing(seen, seen, []) < 0.02
     assert _missing(truth, heard[:0], []) == NEVER
     assert _missing(truth[:0], heard, []) == 0.0
+
+
+def test_what_a_simulator_that_is_not_heard_yet_had_no_time_to_send_is_not_lost() -> None:
+    heard, truth = np.arange(0.0, 9.0, 0.01), np.arange(11.5, 11.6, 0.01)
+    assert _missing(truth, heard, [(9.0, 10.5)]) == pytest.approx(0.1, abs=0.02)
 
 
 def test_what_a_recorder_wrote_late_is_not_lost(tmp_path: Path) -> None:

@@ -32,6 +32,8 @@ ALONE = 1.5
 """[s] between a freeze and the death after it."""
 HEARS_AGAIN = 2.0
 """[s] for which a graph goes on once its recorder is back: ended at once, it shows nothing of what comes after."""
+ENDS_LATER = 4.0
+"""[s] for which a graph goes on whose mission is over: a simulator that was started again is recorded by then."""
 GOING = frozenset(
     {
         State.GET_GRASP_POINT,
@@ -66,8 +68,8 @@ class Outcome:
         mission: `RESUMED`, `REPORTED`, `NEITHER` or `NOT_MET`.
         sentence: told last.
         recovery: of the wall clock, until the mission was under way again [s].
-        lost: of recordings of the same graph, longest stretch that is missing [s], `NEVER` where one cannot be read;
-            None: there is none.
+        lost: of recordings of the same graph, longest time for which the simulator ran and nothing is recorded [s],
+            `NEVER` where one cannot be read; None: there is none.
         found: of the same recordings, longest time in which recorder and simulator, one of them just started, did not
             know of each other [s]; None: there is none.
         before: how missions ended or stood, with other seeds, that did not get to the state, none of them struck.
@@ -204,7 +206,7 @@ def _goes_on(life: Life, case: Case, state: State | None, told: int) -> tuple[st
         life.send_goal()  # who died had heard of it, and who came does not know it
     since = len(life.told) if case.node != "recorder" else told
     if state in ENDED and (case.node != "namo" or case.way == FREEZE):
-        life.wait(1.0)  # nothing goes on; it is still told, to whoever comes later too
+        life.wait(ENDS_LATER)  # nothing goes on; it is still told, to whoever comes later too
         return REPORTED, life.told[-1][2]
 
     def decided() -> bool:
@@ -221,7 +223,7 @@ def _goes_on(life: Life, case: Case, state: State | None, told: int) -> tuple[st
 
 
 def lost_of(life: Life, frozen: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return the longest stretch that a recording of a graph lacks though its simulator ran, and `Outcome.found` [s].
+    """Return the longest time that a recording of a graph lacks though its simulator ran, and `Outcome.found` [s].
 
     What counts is when a message was sent: one that was sent while the recorder was behind is late, and not lost.
 
@@ -257,13 +259,15 @@ def _sent(bag: Path) -> Array:
 
 
 def _missing(truth: Array, heard: Array, frozen: Sequence[tuple[float, float]]) -> float:
-    """Return how far a moment at which the simulator ran is from the next that is recorded, at most [s]."""
+    """Return the longest time [s] for which the simulator ran between two recorded messages, or after the last."""
     for begin, end in frozen:
         truth = truth[(truth < begin) | (truth > end)]
     if not len(truth):
         return 0.0
     if not len(heard):
         return NEVER
-    after = np.clip(np.searchsorted(heard, truth), 0, len(heard) - 1)
-    before = np.clip(after - 1, 0, None)
-    return float(np.minimum(np.abs(heard[after] - truth), np.abs(truth - heard[before])).max())
+    gap = np.searchsorted(heard, truth)
+    piece = np.searchsorted(np.sort([end for _, end in frozen]), truth)  # a freeze amid a gap is no part of it
+    first = np.concatenate([[0], np.flatnonzero(np.diff(gap) | np.diff(piece)) + 1])
+    last = np.concatenate([first[1:], [len(truth)]]) - 1
+    return float(np.bincount(gap[first], truth[last] - truth[first]).max())
