@@ -37,11 +37,12 @@ class Yard:
         self.node = Node("user", context=self._context, enable_rosout=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self.told: set[str] = set()
+        self.told: dict[str, dict[str, str]] = {}
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._tell, 10)
 
     def _tell(self, message: DiagnosticArray) -> None:
-        self.told |= {status.name for status in message.status}
+        for status in message.status:
+            self.told[status.name] = {each.key: each.value for each in status.values}
 
     def until(self, condition: Callable[[], Any]) -> None:
         deadline = time.monotonic() + PATIENCE
@@ -64,7 +65,7 @@ def yard(tmp_path: Path, nothing_left: None, monkeypatch: pytest.MonkeyPatch) ->
         programs = {}
         for number, robot in enumerate(ROBOTS):
             settings = {
-                "hand.rate": "0.0",
+                "hand.rate": "1.0",
                 "hand.seed": str(number),
                 "recorder.output": str(tmp_path / f"bag_{number}"),
             }
@@ -81,6 +82,9 @@ def test_two_robots_push_side_by_side(yard: Yard) -> None:
     yard.until(lambda: all(client.service_is_ready() for client in clients.values()))
     heard = [robot + stream for robot in ROBOTS for stream in STREAMS]
     yard.until(lambda: all(yard.node.count_subscribers(topic) for topic in heard))
+    # That this node knows the recorders does not say that the simulators do; a latched message that has arrived does.
+    counts = [f"{robot[1:]}/recorder" for robot in ROBOTS]
+    yard.until(lambda: all(int(yard.told.get(name, {}).get("messages", "0")) for name in counts))
     calls = []
     for number, client in enumerate(clients.values()):
         way = Vector3(x=1.0) if number == 0 else Vector3(x=1.0, y=0.3)
@@ -89,7 +93,7 @@ def test_two_robots_push_side_by_side(yard: Yard) -> None:
         calls.append(client.call_async(push))
     yard.until(lambda: all(call.done() for call in calls))
     assert [call.result().message for call in calls] == ["done", "done"]
-    yard.until(lambda: yard.told >= {f"{robot[1:]}/{name}" for robot in ROBOTS for name in ("hand", "recorder")})
+    yard.until(lambda: yard.told.keys() >= {f"{robot[1:]}/{name}" for robot in ROBOTS for name in ("hand", "recorder")})
 
     lengths = []
     for number, robot in enumerate(ROBOTS):

@@ -135,7 +135,8 @@ def node_environment(domain: int) -> dict[str, str]:
     environment = dict(os.environ)
     environment["ROS_DOMAIN_ID"] = str(domain)
     environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    # Through shared memory one that is killed may take with it what others hear: a recorder lost 108 s (Fast DDS 5469).
+    # Who is killed may take a lock in shared memory along, for which others wait for ever (Fast DDS 5469). This does
+    # without it, but where the range is LOCALHOST: there rmw_fastrtps adds it all the same (docs/reliability.md).
     environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
     environment["PYTHONUNBUFFERED"] = "1"
     environment["RCUTILS_COLORIZED_OUTPUT"] = "0"
