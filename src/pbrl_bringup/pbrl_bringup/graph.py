@@ -135,7 +135,7 @@ def node_environment(domain: int) -> dict[str, str]:
     environment = dict(os.environ)
     environment["ROS_DOMAIN_ID"] = str(domain)
     environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    # Who is killed may take a lock in shared memory along, for which others wait for ever (Fast DDS 5469). This does
+    # Who is killed may take a lock in shared memory along, for which others wait (Fast DDS 5469). This does
     # without it, but where the range is LOCALHOST: there rmw_fastrtps adds it all the same (docs/reliability.md).
     environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
     environment["PYTHONUNBUFFERED"] = "1"
