@@ -65,7 +65,7 @@ def yard(tmp_path: Path, nothing_left: None, monkeypatch: pytest.MonkeyPatch) ->
         programs = {}
         for number, robot in enumerate(ROBOTS):
             settings = {
-                "hand.rate": "1.0",
+                "hand.rate": "0.0",
                 "hand.seed": str(number),
                 "recorder.output": str(tmp_path / f"bag_{number}"),
             }
