@@ -121,10 +121,3 @@ def test_domains_are_not_shared() -> None:
         assert node_environment(two)["ROS_DOMAIN_ID"] == str(two)
         with socket.socket() as probe, pytest.raises(OSError, match="in use"):
             probe.bind(("", DOMAIN_PORT + one))
-
-
-def test_nodes_do_without_shared_memory_unless_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("FASTDDS_BUILTIN_TRANSPORTS", raising=False)
-    assert node_environment(1)["FASTDDS_BUILTIN_TRANSPORTS"] == "UDPv4"
-    monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "DEFAULT")
-    assert node_environment(1)["FASTDDS_BUILTIN_TRANSPORTS"] == "DEFAULT"

@@ -16,6 +16,7 @@ from bullet_sim.settings import Settings, read_settings
 from pbrl_bag.names import GLOBAL
 from pbrl_bag.yaml_text import parse_yaml
 from pbrl_bringup.errors import BringupError
+from pbrl_bringup.middleware import on_this_machine
 from pbrl_bringup.paths import config_file, node_executable
 from pbrl_bringup.processes import Programs
 from pbrl_bringup.ros.client import GraphClient
@@ -134,10 +135,7 @@ def node_environment(domain: int) -> dict[str, str]:
     """Return the environment of a graph's nodes: the parent's, with a domain on this machine only."""
     environment = dict(os.environ)
     environment["ROS_DOMAIN_ID"] = str(domain)
-    environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    # Who is killed may take a lock in shared memory along, for which others wait (Fast DDS 5469). This does
-    # without it, but where the range is LOCALHOST: there rmw_fastrtps adds it all the same (docs/reliability.md).
-    environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+    environment.update(on_this_machine(environment))
     environment["PYTHONUNBUFFERED"] = "1"
     environment["RCUTILS_COLORIZED_OUTPUT"] = "0"
     # Nodes share few cores: a numeric library that starts a thread a core in each of them slows all.

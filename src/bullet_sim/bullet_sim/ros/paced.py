@@ -20,7 +20,7 @@ import numpy as np
 from pbrl_msgs.srv import GraspObject, ReleaseObject
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64MultiArray
 
 from bullet_sim.errors import SimError
@@ -28,6 +28,7 @@ from bullet_sim.faults import Faults, FaultyLinks
 from bullet_sim.grippers import GraspOutcome
 from bullet_sim.messages import LATCHED, to_messages
 from bullet_sim.ros.diagnostics import PaceDiagnostics
+from bullet_sim.ros.latched import LatchedPublisher
 from bullet_sim.ros.names import relative
 from bullet_sim.ros.parameters import declare
 
@@ -38,7 +39,6 @@ LISTEN_PERIOD = 0.0099
 SLIP = 0.25
 """[s] of wall clock behind schedule at which the lost time is written off instead of caught up."""
 
-LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=100)
 COMMAND_QOS = QoSProfile(depth=1)
 PICTURE_QOS = QoSProfile(depth=2)  # a megabyte each
@@ -124,7 +124,11 @@ class PacedSimulator(Node):
             self._faulty = FaultyLinks(faults, np.random.default_rng(seed))
             self.get_logger().warning("faults are injected: messages or clocks fail on purpose, as the scene has it")
         self._outputs = {
-            topic: self.create_publisher(kind, relative(topic), _quality(topic, latched))
+            topic: LatchedPublisher(self, kind, topic)
+            if topic in latched
+            else self.create_publisher(
+                kind, relative(topic), PICTURE_QOS if topic.startswith("/camera/") else STREAM_QOS
+            )
             for topic, kind in types.items()
         }
         self._diagnostics = PaceDiagnostics(self, lambda: session.time, self._rate, lambda: self._heard)
@@ -254,10 +258,3 @@ class PacedSimulator(Node):
         self._spinner.remove_node(self)
         self._spinner.shutdown()  # left to the collector, it may outlive the context and complain
         super().destroy_node()
-
-
-def _quality(topic: str, latched: Sequence[str]) -> QoSProfile:
-    """Give the quality of service of what is published on a topic."""
-    if topic in latched:
-        return LATCHED_QOS
-    return PICTURE_QOS if topic.startswith("/camera/") else STREAM_QOS

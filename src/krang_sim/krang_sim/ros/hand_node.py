@@ -13,10 +13,11 @@ from typing import Any
 from pbrl_msgs.srv import PushObject
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 
 from bullet_sim.errors import SimError
 from bullet_sim.ros.diagnostics import PaceDiagnostics
+from bullet_sim.ros.latched import LatchedPublisher
 from bullet_sim.ros.names import relative
 from bullet_sim.ros.parameters import declare, refuse_unknown
 from bullet_sim.ros.running import run_node
@@ -26,7 +27,6 @@ from krang_sim.hand_session import HandSession, straight_push
 from krang_sim.messages import LATCHED, message_types, to_messages
 from krang_sim.observations import ClockTick, Observation
 
-LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=1000)
 TOPICS = ("/clock", "/scene", "/grasps", "/wrist_ft/left")
 
@@ -53,7 +53,9 @@ class HandNode(Node):
         types = message_types(self._session.tagged)
         wanted = {*TOPICS, "/ar_tags/left_gripper/pose", *(f"/ar_tags/{name}/pose" for name in self._session.tagged)}
         self._outputs = {
-            topic: self.create_publisher(kind, relative(topic), LATCHED_QOS if topic in LATCHED else STREAM_QOS)
+            topic: LatchedPublisher(self, kind, topic)
+            if topic in LATCHED
+            else self.create_publisher(kind, relative(topic), STREAM_QOS)
             for topic, kind in types.items()
             if topic in wanted
         }

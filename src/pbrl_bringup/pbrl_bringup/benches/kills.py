@@ -33,7 +33,16 @@ class Lived:
 
 CARRIED = Carried(
     ("lives/*.json",),
-    ("bullet_sim", "krang_sim", "pbrl_bag", "pbrl_bringup.kills", "pbrl_control", "pbrl_model", "pbrl_namo"),
+    (
+        "bullet_sim",
+        "krang_sim",
+        "pbrl_bag",
+        "pbrl_bringup.kills",
+        "pbrl_bringup.middleware",
+        "pbrl_control",
+        "pbrl_model",
+        "pbrl_namo",
+    ),
 )
 
 

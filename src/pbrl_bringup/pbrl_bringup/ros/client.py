@@ -19,6 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from pbrl_bag.names import in_namespace
 from pbrl_bringup.errors import BringupError
+from pbrl_bringup.middleware import on_this_machine
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE)
 SPIN = 0.05  # [s] how long one turn waits; bounds how late the end of a node is noticed
@@ -50,7 +51,7 @@ class GraphClient:
     """
 
     def __init__(self, domain: int, check: Callable[[], None] = lambda: None, namespace: str = "") -> None:
-        os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        os.environ.update(on_this_machine(os.environ))
         self._check = check
         self._namespace = namespace
         self._context = Context()
