@@ -106,4 +106,4 @@ def test_who_is_frozen_is_waited_for_once(environment: dict[str, str]) -> None:
     first, once, *others = waited
     assert first < once
     assert once >= 0.1
-    assert min(others) < once
+    assert sum(others) < 0.1 * len(others), "each was waited for"
