@@ -108,7 +108,7 @@ class Passenger(Node):
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Passenger]:
     folder = tmp_path_factory.mktemp("lost_cart_links")
     graph = load_graph("pr2")
-    told = {"sim.scene": str(write_hall(folder)), "sim.rate": RATE, "sim.command_lag": "0.1"}
+    told = {"sim.scene": str(write_hall(folder)), "sim.rate": RATE, "sim.command_lag": "0.07"}
     nodes = with_parameters(graph, told).nodes
     after = {name: node for name, node in nodes.items() if name not in ("sim", "recorder")}
     with free_domain() as domain, Programs(folder / "logs", node_environment(domain)) as programs:

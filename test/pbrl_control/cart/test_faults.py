@@ -25,6 +25,7 @@ FULL = np.ones((2, 7))
 ARMS = ArmState(np.tile(np.eye(6, 7), (2, 1, 1)), 0.0 * FULL, -1e3 * FULL, 1e3 * FULL, 1e3 * FULL)
 
 
+@pytest.mark.parametrize("age", [0.0, 0.01, 0.02, 0.03, 0.04])
 @pytest.mark.parametrize(
     ("stream", "cause"),
     [
@@ -34,19 +35,23 @@ ARMS = ArmState(np.tile(np.eye(6, 7), (2, 1, 1)), 0.0 * FULL, -1e3 * FULL, 1e3 *
         ("arms_time", Cause.JOINTS),
     ],
 )
-def test_a_stream_that_falls_silent_stops_it_within_0_3_s_of_its_last_message(stream: str, cause: Cause) -> None:
+def test_a_stream_that_falls_silent_stops_it_within_0_3_s_of_its_last_message(
+    stream: str, cause: Cause, age: float
+) -> None:
     for path in (straight(2.5), straight(2.5, 0.6), arc(1.0, 1.5, 0.5)):
         controller, world = made(path)
         silent = {}
 
         def streams(w: object, silent: dict = silent) -> dict:
             given = {"arms": ARMS, "arms_time": w.now - 0.03, "scan_time": w.now - 0.03}
-            return given if w.now < 2.0 else given | {stream: silent.setdefault("last", w.now - 0.03)}
+            return given if w.now < 2.0 else given | {stream: silent.setdefault("last", w.now - age)}
 
         ticks = drive(controller, world, FLOOR, 3.0, streams)
         assert max(np.abs(tick.sent).max() for tick in ticks) > 0.2
         late = [tick for tick in ticks if tick.now >= silent["last"] + 0.3]
-        assert not np.any([tick.sent for tick in late])
+        # A laser's next may take 0.05 s, and that counts; the others come at 50 Hz, and their next is waited for.
+        obeyed = silent["last"] + 0.3 + (0.0 if cause is Cause.SCAN else 0.02) - SETTINGS.delay
+        assert not np.any([tick.sent for tick in ticks if tick.now + SETTINGS.period > obeyed + 1e-9])
         assert np.abs(late[1].rates).max() < 0.02, "but for the lag of the drives"
         assert late[-1].command.status is DriveStatus.WAITING and late[-1].command.cause is cause
         assert_within_limits(ticks, SETTINGS.limits)

@@ -118,6 +118,19 @@ class Stage:
     def tell_time(self) -> None:
         self.send("/clock", Clock(clock=stamp_of(self.time)))
 
+    def pass_time(self, node: Node, step: float) -> None:
+        """Move the clock on by a time [s], and nothing else; return once a node has heard it, however busy it is."""
+        self.time += step
+        told = self.time - 1e-6
+
+        def heard() -> bool:
+            if node.get_clock().now().nanoseconds * 1e-9 < told:
+                self.tell_time()  # again: a simulator's last word may have come after it
+                return False
+            return True
+
+        self.until(heard)
+
     def tell_robot(self) -> None:
         stamp = stamp_of(self.time)
         odometry = Odometry(child_frame_id="base")

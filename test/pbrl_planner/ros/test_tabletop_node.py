@@ -84,9 +84,7 @@ def test_a_robot_that_falls_silent_in_a_push_ends_it_in_words(
     stage.time = begun = node._now()
     try:
         while not results:  # somebody else's clock goes on
-            stage.time += 0.1
-            stage.tell_time()
-            stage.executor.spin_once(timeout_sec=0.02)
+            stage.pass_time(node, 0.1)
             assert stage.time < begun + 120.0
     finally:
         simulator.send_signal(signal.SIGCONT)

@@ -145,6 +145,31 @@ def test_a_camera_that_is_silent_ends_it_and_one_that_hesitates_does_not() -> No
     assert slow.executive.ended.ending is Ending.TIDY
 
 
+def test_after_standing_still_a_stroke_goes_on_where_it_was_and_the_camera_is_not_blamed() -> None:
+    stage = Stage(Two())
+    stage.executive.begin(stage.task, 0.0, stage.joints)
+    most = 0.0
+    while stage.executive.ended is None:
+        before = stage.joints
+        if stage.executive.state in (State.PUSHING, State.STOWING, State.LOOKING) and round(stage.now / DT) % 100 == 50:
+            stage.now += 7.0  # longer than any stroke, and than a camera is waited for
+            angles = stage.executive.tick(stage.now, stage.joints)
+            stage.joints = stage.joints if angles is None else angles
+        stage.step()
+        most = max(most, float(np.abs(stage.joints - before).max()))
+        assert stage.now < 600.0
+    assert stage.executive.ended.ending is Ending.TIDY
+    assert stage.now > 30.0, "it stood still several times"
+    calm = Stage(Two())
+    calm.executive.begin(calm.task, 0.0, calm.joints)
+    usual = 0.0
+    while calm.executive.ended is None:
+        before = calm.joints
+        calm.step()
+        usual = max(usual, float(np.abs(calm.joints - before).max()))
+    assert most < 2.5 * usual, "two ticks may lie between two looks at the arm, seven seconds may not"
+
+
 def test_halted_in_mid_push_nothing_is_moved_any_more() -> None:
     stage = Stage(Two())
     stage.executive.begin(stage.task, 0.0, stage.joints)

@@ -27,7 +27,7 @@ COMFORT = 0.5  # of the braking limits, with which it stops before what it sees 
 QUICKEST = 4.0  # [1/s] at which the goal's pace grows at most
 CREEPING = 0.05  # pace below which there is no progress
 ROUNDING = 1e-6  # of a pace
-USUAL_AGE = 0.05  # [s] of poses and joints that come as they should: a link is lost when the next would have come
+USUAL_AGE = 0.02  # [s] of poses and joints at 50 Hz: a link is lost when the next would have come
 STILL = 0.02  # [m/s, rad/s] standing
 WINDOW = 0.5  # [s] of the plan about the goal in which it is looked for after a stop, and where a plan is joined
 

@@ -20,6 +20,8 @@ LOOKS = 3
 """Pictures in which an item may be missing before it counts as lost: people reach across tables."""
 BLIND = 5.0
 """Without a look for so long [s] the camera is not there any more."""
+STOOD = 0.5
+"""A tick that comes later than this after the last one says that whoever ticks stood still, not the others [s]."""
 
 
 class State(Enum):
@@ -52,7 +54,7 @@ class DeskExecutive:
         self.question: Mapping[str, Array] | None = None
         self.last_task: Task | None = None
         self._stroke: Stroke | None = None
-        self._begun = self._clear = self._looked = 0.0
+        self._begun = self._clear = self._looked = self._ticked = 0.0
         self._misses = 0
 
     @property
@@ -69,6 +71,7 @@ class DeskExecutive:
             joints: (4,) where the arm is [rad].
         """
         self.last_task, self.ended, self.question, self._misses = task, None, None, 0
+        self._ticked = now
         self._stow(now, joints)
 
     def cancel(self, now: float, joints: Array) -> None:
@@ -90,6 +93,7 @@ class DeskExecutive:
             now: time [s].
             joints: (4,) where the arm is [rad].
         """
+        self._go_on_after_standing(now)
         if self.state is State.LOOKING and now > self._looked + BLIND:
             self.halt(Ended(Ending.BLIND, f"no picture of it for {BLIND:.0f} s; is the camera running?"))
         if self._stroke is None:
@@ -134,6 +138,14 @@ class DeskExecutive:
             self._start(self._strokes.push(joints, asked.path), now, State.PUSHING)
         except ControlError as error:
             self.ended, self.state = Ended(Ending.UNREACHED, str(error)), State.IDLE
+
+    def _go_on_after_standing(self, now: float) -> None:
+        """Let time in which nobody ticked not count: a stroke goes on where it is, a look is waited for anew."""
+        stood = now - self._ticked
+        if stood > STOOD:
+            self._begun += stood
+            self._looked += stood
+        self._ticked = now
 
     def _stow(self, now: float, joints: Array) -> None:
         try:
