@@ -21,7 +21,7 @@ from rosgraph_msgs.msg import Clock
 from pbrl_bringup.errors import BringupError
 from pbrl_bringup.experiments.namo_rooms import STUCK, draw_room
 from pbrl_bringup.files import write_text
-from pbrl_bringup.graph import free_domain, load_graph, node_command, node_environment, with_parameters
+from pbrl_bringup.graph import free_domain, load_graph, node_command, node_environment, wait_ready, with_parameters
 from pbrl_bringup.processes import Programs
 from pbrl_bringup.ros.client import GraphClient, Heard
 from pbrl_bringup.terminal import progress
@@ -91,11 +91,13 @@ def in_rooms(folder: Path, seed: int, length: float) -> tuple[list[Room], list[S
     rooms: list[Room] = []
     samples: list[Sample] = []
     with free_domain() as domain, Programs(folder / "logs", node_environment(domain)) as programs:
-        for name, node in graph.nodes.items():
-            if name != "sim":
-                programs.start(name, node_command(name, node))
+        stay = {name: node for name, node in graph.nodes.items() if name != "sim"}
+        for name, node in stay.items():
+            programs.start(name, node_command(name, node))
         with GraphClient(domain, programs.check) as client, progress("simulated", total=length) as bar:
+            wait_ready(graph.model_copy(update={"nodes": stay}), client, STARTED)
             status = client.listen(NamoStatus, "/namo/status")
+            client.wait_for_subscribers("/namo/status", 2, STARTED)  # the other is the recorder
             clock = client.listen(Clock, "/clock", latched=False)
             while (done := sum(room.seconds for room in rooms)) < length:
                 bar(done)
