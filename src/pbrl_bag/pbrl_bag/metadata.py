@@ -19,7 +19,7 @@ STORAGES = ("mcap", "sqlite3")
 """That can be read."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class TopicMetadata:
     """One topic of a bag."""
 
@@ -27,9 +27,8 @@ class TopicMetadata:
     type: str
     qos: tuple[Qos, ...]
     type_hash: str = ""
-    count: int = 0
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, count: int) -> dict[str, Any]:
         """Return the topic's entry in topics_with_message_count."""
         return {
             "topic_metadata": {
@@ -39,47 +38,76 @@ class TopicMetadata:
                 "offered_qos_profiles": [qos.to_metadata() for qos in self.qos],
                 "type_description_hash": self.type_hash,
             },
-            "message_count": self.count,
+            "message_count": count,
         }
 
 
 @dataclass
-class BagMetadata:
-    """What metadata.yaml says of a bag of one file; times in nanoseconds."""
+class FileContents:
+    """What one file of a bag holds.
 
-    file: str
-    ros_distro: str = "jazzy"
+    Attributes:
+        name: of the file, in the bag's folder.
+        start: log time of the first message [ns]; None without messages.
+        end: of the last [ns].
+        counts: messages by topic.
+    """
+
+    name: str
     start: int | None = None
     end: int | None = None
-    topics: dict[str, TopicMetadata] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def message_count(self) -> int:
+        """Messages over all topics."""
+        return sum(self.counts.values())
 
     def count(self, topic: str, log_time: int) -> None:
         """Take note of one message."""
-        self.topics[topic].count += 1
+        self.counts[topic] = self.counts.get(topic, 0) + 1
         self.start = log_time if self.start is None else min(self.start, log_time)
         self.end = log_time if self.end is None else max(self.end, log_time)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the whole document."""
-        start = self.start or 0
-        duration = 0 if self.end is None else self.end - start
-        total = sum(topic.count for topic in self.topics.values())
-        span = {"duration": {"nanoseconds": duration}, "starting_time": {"nanoseconds_since_epoch": start}}
+        """Return the file's entry in files."""
+        return {"path": self.name, **_span([self]), "message_count": self.message_count}
+
+
+@dataclass
+class BagMetadata:
+    """What metadata.yaml says of a bag."""
+
+    ros_distro: str = "jazzy"
+    topics: dict[str, TopicMetadata] = field(default_factory=dict)
+    files: list[FileContents] = field(default_factory=list)
+
+    def to_dict(self, only: FileContents | None = None) -> dict[str, Any]:
+        """Return the whole document, or that of a bag of one of the files."""
+        files = self.files if only is None else [only]
+        counts = {name: sum(file.counts.get(name, 0) for file in files) for name in self.topics}
         return {
             "rosbag2_bagfile_information": {
                 "version": VERSION,
                 "storage_identifier": "mcap",
-                **span,
-                "message_count": total,
-                "topics_with_message_count": [topic.to_dict() for topic in self.topics.values()],
+                **_span(files),
+                "message_count": sum(counts.values()),
+                "topics_with_message_count": [topic.to_dict(counts[name]) for name, topic in self.topics.items()],
                 "compression_format": "",
                 "compression_mode": "",
-                "relative_file_paths": [self.file],
-                "files": [{"path": self.file, **span, "message_count": total}],
+                "relative_file_paths": [file.name for file in files],
+                "files": [file.to_dict() for file in files],
                 "custom_data": None,
                 "ros_distro": self.ros_distro,
             }
         }
+
+
+def _span(files: list[FileContents]) -> dict[str, Any]:
+    """Return duration and beginning of what some files hold together."""
+    start = min((file.start for file in files if file.start is not None), default=0)
+    end = max((file.end for file in files if file.end is not None), default=start)
+    return {"duration": {"nanoseconds": end - start}, "starting_time": {"nanoseconds_since_epoch": start}}
 
 
 def record_text(document: dict[str, Any]) -> str:

@@ -3,11 +3,13 @@
 A finished chunk is never lost: chunks are finished at least every `FLUSH_SECONDS` of wall time and
 handed to the disk, so a process that is killed loses no more than that and the file reads up to there.
 A disk that fails or is full costs no more either: the file is cut back to its last finished chunk.
+
+A live recording is one of several files: the index of a file's chunks lies in memory until the file is
+finished, and grows with each of them. What is in the files before the last is whole whatever happens.
 """
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections.abc import Iterable
@@ -16,28 +18,28 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
-from mcap.writer import CompressionType, Writer
-
+from pbrl_bag.bag_file import BagFile
 from pbrl_bag.encoding import Encoder
 from pbrl_bag.errors import BagError
-from pbrl_bag.metadata import BagMetadata, TopicMetadata, qos_text, record_text, write_metadata
+from pbrl_bag.metadata import BagMetadata, TopicMetadata, record_text, write_metadata
 from pbrl_bag.qos import Qos, default_qos
-from pbrl_bag.schema import message_definition, type_hash
+from pbrl_bag.schema import type_hash
 
 FLUSH_SECONDS = 0.4  # [s] of wall time; a chunk in work is never older
 METADATA_SECONDS = 1.0  # [s]
-CHUNK_BYTES = 1 << 20
+FILE_CHUNKS = 1500
+"""In a file of a live recording: ten minutes, where chunks are finished by time."""
 
 
 class BagWriter:
-    """Writes one bag folder `<name>/<name>_0.mcap` with its metadata.yaml.
+    """Writes one bag folder: `<name>/<name>_0.mcap`, `<name>_1.mcap` and so on, with their metadata.yaml.
 
     Args:
         folder: has not to exist yet: recordings are never written over.
-        live: finish chunks by wall time, for recordings of running graphs. False: by size alone,
-            so that the same messages make the same bytes.
+        live: finish chunks by wall time, and files after so many of them, for recordings of running
+            graphs. False: chunks by size alone and one file, so that the same messages make the same bytes.
         ros_distro: what metadata.yaml says.
+        file_chunks: of a live recording's file; then the next is begun.
 
     Raises:
         BagError: the folder exists or cannot be made.
@@ -45,9 +47,11 @@ class BagWriter:
     Safe to call from several threads.
     """
 
-    def __init__(self, folder: Path | str, *, live: bool = True, ros_distro: str = "jazzy"):
+    def __init__(
+        self, folder: Path | str, *, live: bool = True, ros_distro: str = "jazzy", file_chunks: int = FILE_CHUNKS
+    ):
         self.folder = Path(folder)
-        name = self.folder.resolve().name
+        self._file_chunks = file_chunks
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError as error:
@@ -56,23 +60,19 @@ class BagWriter:
             ) from error
         except OSError as error:
             raise BagError(f"{folder}: cannot make this folder: {error.strerror or error}") from error
-        self.path = self.folder / f"{name}_0.mcap"
-        self._file = self.path.open("wb")
-        self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-        self._writer.start(profile=Profile.ROS2, library="pbrl_bag")
-        self._file.flush()  # a recorder killed at once leaves an empty recording, not an empty file
-        self._good = self._file.tell()
-        self._metadata = BagMetadata(self.path.name, ros_distro)
-        self._channels: dict[str, tuple[int, str]] = {}
-        self._schemas: dict[str, int] = {}
+        self._metadata = BagMetadata(ros_distro)
         self._sequence: dict[str, int] = {}
         self._encoder = Encoder()
         self._lock = threading.RLock()
+        self._disk_lock = threading.Lock()  # taken before the other, by who waits for the disk: messages do not
         self._failure: OSError | None = None
         self._dirty = False
         self._closed = threading.Event()
-        self._on_disk = self._metadata.to_dict()
-        self._save()
+        try:
+            self._file = self._next_file()
+            self._save()
+        except OSError as error:
+            raise BagError(f"{folder}: cannot write: {error.strerror or error}; nothing is recorded") from error
         self._thread = threading.Thread(target=self._keep_safe, name="bag-flush", daemon=True) if live else None
         if self._thread:
             self._thread.start()
@@ -86,9 +86,15 @@ class BagWriter:
         self.close()
 
     @property
+    def path(self) -> Path:
+        """The file that is written to."""
+        return self._file.path
+
+    @property
     def message_count(self) -> int:
         """Messages written so far, over all topics."""
-        return sum(topic.count for topic in self._metadata.topics.values())
+        with self._lock:
+            return sum(file.message_count for file in self._metadata.files)
 
     def add_topic(self, topic: str, type_name: str, qos: Iterable[Qos] | None = None) -> None:
         """Announce a topic: its type and how it is offered; `write` does so with the contract's QoS.
@@ -97,21 +103,15 @@ class BagWriter:
             BagError: the type is not installed, or the topic is there with another type.
         """
         with self._lock:
-            known = self._channels.get(topic)
+            known = self._metadata.topics.get(topic)
             if known is not None:
-                if known[1] != type_name:
-                    raise BagError(f"{topic}: expected one type, got {known[1]} before and {type_name} now")
+                if known.type != type_name:
+                    raise BagError(f"{topic}: expected one type, got {known.type} before and {type_name} now")
                 return
             profiles = (default_qos(topic),) if qos is None else tuple(qos)
-            schema = self._schema(type_name)
-            channel = self._writer.register_channel(
-                topic,
-                MessageEncoding.CDR,
-                schema,
-                {"offered_qos_profiles": qos_text(profiles), "topic_type_hash": type_hash(type_name)},
-            )
-            self._channels[topic] = (channel, type_name)
-            self._metadata.topics[topic] = TopicMetadata(topic, type_name, profiles, type_hash(type_name))
+            new = TopicMetadata(topic, type_name, profiles, type_hash(type_name))
+            self._file.announce(new)
+            self._metadata.topics[topic] = new
 
     def write(
         self, topic: str, type_name: str, message: Any, log_time_ns: int, publish_time_ns: int | None = None
@@ -135,17 +135,11 @@ class BagWriter:
             self.add_topic(topic, type_name)
             data = message if isinstance(message, bytes) else self._encode(topic, type_name, message)
             self._sequence[topic] = sequence = self._sequence.get(topic, 0) + 1
+            sent_ns = log_time_ns if publish_time_ns is None else publish_time_ns
             try:
-                self._writer.add_message(
-                    self._channels[topic][0],
-                    log_time_ns,
-                    data,
-                    log_time_ns if publish_time_ns is None else publish_time_ns,
-                    sequence,
-                )
+                self._file.add(topic, data, log_time_ns, sent_ns, sequence)
             except OSError as error:
                 raise self._fail(error) from error
-            self._metadata.count(topic, log_time_ns)
             self._dirty = True
 
     def flush(self) -> None:
@@ -154,21 +148,14 @@ class BagWriter:
         Raises:
             BagError: the disk failed.
         """
-        with self._lock:
-            if self._closed.is_set() or not self._dirty:
-                return
-            try:
-                self._writer.flush()  # type: ignore[no-untyped-call]
-                self._file.flush()
-            except OSError as error:
-                raise self._fail(error) from error
-            self._dirty = False
-            self._good = self._file.tell()
-            self._on_disk = self._metadata.to_dict()
-        try:
-            os.fsync(self._file.fileno())
-        except OSError as error:  # what was thought to be written is not
+        with self._disk_lock:
             with self._lock:
+                if self._closed.is_set() or not self._dirty:
+                    return
+                self._finish_chunk()
+            try:
+                self._file.sync()
+            except OSError as error:  # what was thought to be written is not
                 raise self._fail(error) from error
 
     def close(self) -> None:
@@ -183,26 +170,75 @@ class BagWriter:
             self._closed.set()
         if self._thread:
             self._thread.join()
-        if self._failure:
-            raise self._disk(self._failure)
-        whole = self._metadata.to_dict()
+        with self._disk_lock:
+            if self._failure:
+                self._file.close()
+                raise self._disk(self._failure)
+            whole = self._metadata.to_dict()
+            self._finish(self._file)
+            self._on_disk = whole
+            self._save_if_there_is_room()
+
+    def _next_file(self) -> BagFile:
+        """Make the bag's next file, and name it in metadata."""
+        number = len(self._metadata.files)
+        file = BagFile(self.folder / f"{self.folder.resolve().name}_{number}.mcap")
+        self._metadata.files.append(file.contents)
+        self._on_disk = self._metadata.to_dict()
+        return file
+
+    def _begin_next_file(self) -> None:
+        """Go on in a new file and finish the one before, while messages come.
+
+        metadata.yaml names the new file before anything is in it: who dies meanwhile has both.
+
+        Raises:
+            BagError: the disk failed.
+        """
+        with self._disk_lock:
+            with self._lock:
+                self._finish_chunk()
+                try:
+                    following = self._next_file()
+                except OSError as error:
+                    raise self._fail(error) from error
+            try:
+                before = self._go_on_in(following)
+            except BagError:
+                following.close()
+                raise
+            self._finish(before)
+
+    def _go_on_in(self, following: BagFile) -> BagFile:
+        """Let all that comes be written into the next file; return the one before, its last chunk finished."""
         try:
-            self._writer.add_metadata("rosbag2", {"serialized_metadata": record_text(whole)})
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._file.flush()
-            os.fsync(self._file.fileno())
-            self._file.close()
+            self._save()
         except OSError as error:
             raise self._fail(error) from error
-        self._on_disk = whole
-        self._save_if_there_is_room()
+        with self._lock:
+            if self._failure:
+                raise self._disk(self._failure)
+            self._finish_chunk()
+            for topic in self._metadata.topics.values():
+                following.announce(topic)
+            before, self._file = self._file, following
+        return before
 
-    def _schema(self, type_name: str) -> int:
-        """Return the id of a type's schema, registered on first use."""
-        if type_name not in self._schemas:
-            text = message_definition(type_name).encode()
-            self._schemas[type_name] = self._writer.register_schema(type_name, SchemaEncoding.ROS2, text)
-        return self._schemas[type_name]
+    def _finish_chunk(self) -> None:
+        """Finish the chunk in work; with the lock held."""
+        try:
+            self._file.finish_chunk()
+        except OSError as error:
+            raise self._fail(error) from error
+        self._dirty = False
+        self._on_disk = self._metadata.to_dict()
+
+    def _finish(self, file: BagFile) -> None:
+        """Finish a file that nobody writes to any more."""
+        try:
+            file.finish(record_text(self._metadata.to_dict(only=file.contents)))
+        except OSError as error:
+            raise self._fail(error) from error
 
     def _encode(self, topic: str, type_name: str, message: Any) -> bytes:
         """Encode a message, naming the topic if that fails."""
@@ -228,17 +264,12 @@ class BagWriter:
 
     def _fail(self, error: OSError) -> BagError:
         """Return the error for a disk that failed, and keep what is on it: whole chunks, and nothing behind them."""
-        if self._failure is None:
-            self._failure = error
-            with suppress(OSError):
-                os.ftruncate(self._file.fileno(), self._good)
-            # What is left in the buffer must not be written behind that, whenever it is let go.
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self._file.fileno())
-            os.close(nowhere)
-            self._file.close()
-            self._save_if_there_is_room()
-        return self._disk(self._failure)
+        with self._lock:
+            if self._failure is None:
+                self._failure = error
+                self._file.cut_back()
+                self._save_if_there_is_room()
+            return self._disk(self._failure)
 
     def _save(self) -> None:
         """Write metadata.yaml: what finished chunks hold, so that it never promises what a crash takes."""
@@ -255,12 +286,13 @@ class BagWriter:
         while not self._closed.wait(FLUSH_SECONDS):
             try:
                 self.flush()
+                if self._file.chunks >= self._file_chunks:
+                    self._begin_next_file()
                 if time.monotonic() - saved >= METADATA_SECONDS:
                     self._save()
                     saved = time.monotonic()
             except OSError as error:
-                with self._lock:
-                    self._fail(error)
+                self._fail(error)
                 return
             except BagError:  # it is kept, and said by whoever writes next
                 return
