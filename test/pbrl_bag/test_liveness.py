@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrl_bag.ros.liveness import OWN_DELAY, Liveness
+from pbrl_bag.liveness import OWN_DELAY, Liveness
 
 DT = 0.1
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pbrl_bag import BagError, read_recording
-from pbrl_bag.names import GLOBAL, canonical, in_namespace, namespace_of, relative
+from pbrl_bag.names import GLOBAL, canonical, hidden, in_namespace, namespace_of, relative
 
 TOKENS = st.from_regex(r"[a-z][a-z0-9_]{0,5}", fullmatch=True)
 NAMES = st.lists(TOKENS, min_size=1, max_size=3).map(lambda tokens: "/" + "/".join(tokens))
@@ -33,6 +33,13 @@ def test_what_begins_alike_is_not_in_the_namespace(name: str, namespace: str) ->
 def test_a_relative_name_in_the_root_is_the_name(name: str) -> None:
     assert "/" + relative(name) == name
     assert [relative(one) for one in GLOBAL] == list(GLOBAL)
+
+
+@given(NAMES, SPACES, TOKENS)
+def test_what_is_hidden_is_hidden_in_every_namespace(name: str, namespace: str, token: str) -> None:
+    assert not hidden(in_namespace(name, namespace))
+    assert hidden(in_namespace(f"{name}/_{token}/status", namespace))
+    assert hidden(f"/_{token}")
 
 
 @pytest.mark.parametrize(

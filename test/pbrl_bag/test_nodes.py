@@ -109,6 +109,7 @@ def test_a_recording_that_is_stopped_is_whole(graph: Graph, tmp_path: Path, how:
     latched.publish(String(data="said before anyone listened"))
     loose = graph.node.create_publisher(String, "/loose", LOOSE)
     out = graph.node.create_publisher(String, "/left_out", 10)
+    graph.node.create_publisher(String, "/push/_action/feedback", LATCHED).publish(String(data="hidden"))
     recorder = graph.start("recorder_node", output=tmp_path / "bag", exclude="['/left_*', '/rosout']")
     graph.until(lambda: loose.get_subscription_count() > 0 and latched.get_subscription_count() > 0)
     late = graph.node.create_publisher(String, "/late", 100)
@@ -128,13 +129,15 @@ def test_a_recording_that_is_stopped_is_whole(graph: Graph, tmp_path: Path, how:
     assert topics["/late"].count == 100
     assert topics["/latched"].count == 1
     assert topics["/latched"].qos[0].durability == "transient_local"
-    assert "/left_out" not in topics
+    assert not {"/left_out", "/push/_action/feedback"} & set(topics)
+    assert "is not recorded" not in errors
     texts = [message.data for message in McapFile(recorded).messages() if message.topic == "/late"]
     assert [text[8:].rstrip(b"\0").decode() for text in texts] == [str(i) for i in range(100)]
 
 
-def test_a_recording_of_listed_topics_has_no_others(graph: Graph, tmp_path: Path) -> None:
-    wanted = graph.node.create_publisher(String, "/arm/left", 10)
+@pytest.mark.parametrize("name", ["/arm/left", "/arm/_hidden"])
+def test_a_recording_of_listed_topics_has_no_others(graph: Graph, tmp_path: Path, name: str) -> None:
+    wanted = graph.node.create_publisher(String, name, 10)
     other = graph.node.create_publisher(String, "/other", 10)
     recorder = graph.start("recorder_node", output=tmp_path / "bag", topics="['/arm/*']")
     graph.until(lambda: wanted.get_subscription_count() > 0)
@@ -144,7 +147,7 @@ def test_a_recording_of_listed_topics_has_no_others(graph: Graph, tmp_path: Path
     graph.until(lambda: describe(recorded).message_count > 0)
     recorder.send_signal(signal.SIGINT)
     recorder.communicate(timeout=PATIENCE)
-    assert [topic.name for topic in describe(tmp_path / "bag").topics] == ["/arm/left"]
+    assert [topic.name for topic in describe(tmp_path / "bag").topics] == [name]
 
 
 def test_a_publisher_that_offers_less_is_heard_all_the_same(graph: Graph, tmp_path: Path) -> None:

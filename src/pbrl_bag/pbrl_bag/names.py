@@ -44,6 +44,11 @@ def canonical(name: str, namespace: str) -> str | None:
     return name[len(prefix) - 1 :] if name.startswith(prefix) else None
 
 
+def hidden(name: str) -> bool:
+    """Tell whether a name is kept from lists of names, as those of an action's parts are: a token of it begins with _."""
+    return "/_" in name
+
+
 def namespace_of(topics: Iterable[str], where: str) -> str:
     """Return the namespace of the robot that a recording is of: empty, the root, or the only one that there is.
 

@@ -123,17 +123,17 @@ class PacedSimulator(Node):
         if faults.any:
             self._faulty = FaultyLinks(faults, np.random.default_rng(seed))
             self.get_logger().warning("faults are injected: messages or clocks fail on purpose, as the scene has it")
-        self._outputs = {
-            topic: LatchedPublisher(self, kind, topic)
-            if topic in latched
-            else self.create_publisher(
-                kind, relative(topic), PICTURE_QOS if topic.startswith("/camera/") else STREAM_QOS
-            )
-            for topic, kind in types.items()
-        }
+        self._outputs = {topic: self._publisher(topic, kind, topic in latched) for topic, kind in types.items()}
         self._diagnostics = PaceDiagnostics(self, lambda: session.time, self._rate, lambda: self._heard)
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
+
+    def _publisher(self, topic: str, kind: Callable[[], Any], latched: bool) -> Any:
+        """Return what publishes a topic, by how much of it is worth keeping for whom."""
+        if latched:
+            return LatchedPublisher(self, kind, topic)
+        qos = PICTURE_QOS if topic.startswith("/camera/") else STREAM_QOS
+        return self.create_publisher(kind, relative(topic), qos)
 
     def obey_arms(self, session: TwoArmed) -> None:
         """Obey the commands of two arms, and offer to grasp and release."""

@@ -30,11 +30,11 @@ class CrashResult:
 
     Attributes:
         sent: counter of the last message published before the kill.
-        recorded: counter of the last message in the file.
-        missing: counters absent between the first and the last in the file.
-        lost_seconds: from the last message in the file to the kill [s].
-        finished: the file has a footer (it should not).
-        metadata_count: what metadata.yaml says; the file may hold more.
+        recorded: counter of the last message recorded.
+        missing: counters absent between the first and the last recorded.
+        lost_seconds: from the last message recorded to the kill [s].
+        finished: the last file has a footer (it should not).
+        metadata_count: what metadata.yaml says; the files may hold more.
     """
 
     sent: int
@@ -89,8 +89,8 @@ def inspect(folder: Path, sent: int, killed: float) -> CrashResult:
         sent: counter of the last message published.
         killed: wall time of the kill [s].
     """
-    file = McapFile(files_of_bag(folder)[0])
-    messages = [message for message in file.messages() if message.topic == TOPIC]
+    files = [McapFile(path) for path in files_of_bag(folder)]
+    messages = [message for file in files for message in file.messages() if message.topic == TOPIC]
     if not messages:
         raise BagError(f"{folder}: expected messages on {TOPIC} before the kill, got none")
     counters = [int.from_bytes(message.data[4:12], "little") for message in messages]
@@ -99,7 +99,7 @@ def inspect(folder: Path, sent: int, killed: float) -> CrashResult:
         recorded=counters[-1],
         missing=counters[-1] - counters[0] + 1 - len(set(counters)),
         lost_seconds=killed - messages[-1].log_time / 1e9,
-        finished=file.finished,
+        finished=files[-1].finished,
         metadata_count=int(read_metadata(folder)["message_count"]),
     )
 

@@ -1,4 +1,4 @@
-"""Records topics into a bag, as they are on the wire: nothing is decoded."""
+"""Records topics into a bag, as they are on the wire: nothing is decoded. A long recording is several files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from pbrl_bag.errors import BagError
-from pbrl_bag.names import GLOBAL, canonical
+from pbrl_bag.names import GLOBAL, canonical, hidden
 from pbrl_bag.qos import Qos
 from pbrl_bag.ros.conversions import message_class, profile_that_hears, qos_from_profile
 from pbrl_bag.ros.diagnostics import Diagnostics
@@ -83,7 +83,7 @@ class RecorderNode(Node):
         super().__init__("recorder_node", **options)
         text = "bag folder to make, which must not exist yet; empty: recording_<date and time>"
         output = declare(self, "output", "", text)
-        self.topics = declare(self, "topics", [], "topics to record, * matches any text; empty: all")
+        self.topics = declare(self, "topics", [], "topics to record, * matches any text; empty: all but hidden ones")
         self.exclude = declare(self, "exclude", NOT_RECORDED, "topics to leave out, * matches any text")
         refuse_unknown(self)
         self.output: str = output or datetime.now().strftime("recording_%Y_%m_%d-%H_%M_%S")
@@ -113,7 +113,9 @@ class RecorderNode(Node):
         topic = own or topic
         if any(fnmatch.fnmatchcase(topic, pattern) for pattern in self.exclude):
             return False
-        return not self.topics or any(fnmatch.fnmatchcase(topic, pattern) for pattern in self.topics)
+        if not self.topics:
+            return not hidden(topic)  # as `ros2 bag record`
+        return any(fnmatch.fnmatchcase(topic, pattern) for pattern in self.topics)
 
     def discover(self) -> None:
         """Subscribe to what is new, and again where publishers came that the old request keeps out."""

@@ -26,9 +26,9 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
+from pbrl_bag.liveness import Liveness
 from pbrl_bag.names import relative
 from pbrl_bag.ros.diagnostics import Diagnostics
-from pbrl_bag.ros.liveness import Liveness
 from pbrl_bag.ros.parameters import declare, refuse_unknown
 from pbrl_bag.ros.running import run_node
 from pbrl_bag.ros.stopping import spin_in_order

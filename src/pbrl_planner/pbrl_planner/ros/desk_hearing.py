@@ -17,8 +17,8 @@ from tf2_msgs.msg import TFMessage
 
 from pbrl_bag.errors import BagError
 from pbrl_bag.geometry import bodies_of_scene
+from pbrl_bag.liveness import Liveness
 from pbrl_bag.ros.diagnostics import Diagnostics
-from pbrl_bag.ros.liveness import Liveness
 from pbrl_control.ball_arm import JOINTS, BallArm, Strokes
 from pbrl_control.errors import ControlError
 from pbrl_control.planar import Array

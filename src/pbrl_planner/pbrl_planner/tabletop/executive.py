@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import Enum
 
+from pbrl_bag.liveness import OWN_DELAY
 from pbrl_control.ball_arm import Stroke, Strokes
 from pbrl_control.errors import ControlError
 from pbrl_control.planar import Array
@@ -20,8 +21,6 @@ LOOKS = 3
 """Pictures in which an item may be missing before it counts as lost: people reach across tables."""
 BLIND = 5.0
 """Without a look for so long [s] the camera is not there any more."""
-STOOD = 0.5
-"""A tick that comes later than this after the last one says that whoever ticks stood still, not the others [s]."""
 
 
 class State(Enum):
@@ -142,7 +141,7 @@ class DeskExecutive:
     def _go_on_after_standing(self, now: float) -> None:
         """Let time in which nobody ticked not count: a stroke goes on where it is, a look is waited for anew."""
         stood = now - self._ticked
-        if stood > STOOD:
+        if stood > OWN_DELAY:
             self._begun += stood
             self._looked += stood
         self._ticked = now
