@@ -45,7 +45,7 @@ def canonical(name: str, namespace: str) -> str | None:
 
 
 def hidden(name: str) -> bool:
-    """Tell whether a name is kept from lists of names, as those of an action's parts are: a token of it begins with _."""
+    """Tell whether a name is left out of lists of names, as those of an action are: a token of it begins with _."""
     return "/_" in name
 
 
