@@ -12,6 +12,7 @@ import pytest
 
 from pbrl_bag.types import Recording
 from pbrl_mismatch import DiagnoseOptions, track_of
+from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.search.fitted import Fitted, cut_stages, fit_from
 from pbrl_mismatch.search.grip import GripEvidence, GripLaw, beside_motion
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
@@ -24,6 +25,8 @@ OPTIONS = DiagnoseOptions(
 )
 WORTH = 5.0
 """What an effect has to be worth along the path [nat]."""
+SAYS_NOTHING = 16.0
+"""What three numbers that are not needed cost by their priors [nat], with some for a climb that is not at its end."""
 
 
 def base_of(recording: Recording) -> tuple[Any, Any, Fitted]:
@@ -64,6 +67,23 @@ def test_what_only_the_grippers_poses_show_is_worth_simulating(
     assert not search_library(np.random.SeedSequence(0), track, [base], stages, options, WORTH)
     found = search_library(np.random.SeedSequence(0), track, [base], stages, options, WORTH, grip)
     assert ("time_offset",) in {each.hypothesis.effects for each in found}
+
+
+def test_an_effect_that_says_nothing_is_hardly_less_likely_than_what_it_is_laid_on(
+    concealed_recording: Callable[..., Recording],
+) -> None:
+    track, stages, base = base_of(concealed_recording("ground_friction", 1))
+    few = ("ground_friction", "wrench_bias", "floor_slope")
+    without = tuple(name for name in DiagnoseOptions().effects if name not in few)
+    options = OPTIONS.model_copy(update={"without": without, "shortlist": 8, "survivors": (8,), "keep": (1, 1)})
+    found = search_library(np.random.SeedSequence(0), track, [base], stages, options)
+    best = max(found, key=lambda each: float(each.peak.evidence[0]))
+    assert best.hypothesis.effects == ("ground_friction",)
+    sets = search_library(np.random.SeedSequence(1), track, [best], stages, options)
+    offsets = [each for each in sets if "wrench_bias" in each.hypothesis.effects]
+    assert len(offsets) == len(EFFECTS["wrench_bias"].variants)
+    for each in offsets:
+        assert each.peak.evidence[0] > best.peak.evidence[0] - SAYS_NOTHING, each.hypothesis.variant
 
 
 def test_of_sets_that_go_on_each_counts_once_in_whatever_order_it_was_found() -> None:

@@ -89,7 +89,7 @@ def search_library(
     def begin_simulated(k: int) -> tuple[Hypothesis, Array]:
         (name, _, base, _), found = jobs[k], begun[k]
         if not is_another(name, base):
-            return found.hypothesis, found.coordinates
+            return found.hypothesis, _with_simulated_ground(found, base)
         rng = np.random.default_rng(seeds[k].spawn(1)[0])
         two = parted_starts(rng, found.hypothesis, base, stages.fitted[0], options)
         return found.hypothesis, np.concatenate([two, found.coordinates])
@@ -172,6 +172,21 @@ def of_every_shape(jobs: Sequence[tuple[str, int]], chosen: Sequence[int]) -> li
     """
     touching = {jobs[k] for k in chosen if EFFECTS[jobs[k][0]].touches is not None}
     return [k for k, job in enumerate(jobs) if k in chosen or job in touching]
+
+
+def _with_simulated_ground(found: PathPeak, base: Fitted) -> Array:
+    """Return starts (n, K): what was found along the path, and the best of it on a ground with effects as simulated.
+
+    A path and a simulation have their tops apart, and a ground's was climbed to for long: a set that begins at the
+    path's, and ends below what it is laid on, had not the steps to come back.
+    """
+    if not base.hypothesis.effects:
+        return found.coordinates
+    columns, laid = found.hypothesis.columns, found.coordinates[:1].copy()
+    for column, value in zip(base.hypothesis.columns, base.peak.coordinates[0], strict=True):
+        if column in columns:
+            laid[:, columns.index(column)] = value
+    return np.concatenate([found.coordinates, laid])
 
 
 def _path_above_simulation(base: Fitted) -> float:
