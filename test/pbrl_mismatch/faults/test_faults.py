@@ -21,7 +21,7 @@ from pbrl_mismatch.data.missing import Missing, seconds_missing
 from pbrl_mismatch.data.residual import residual_wrench
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.diagnose import track_of
-from pbrl_mismatch.faults.carried import off_pin, paired
+from pbrl_mismatch.faults.carried import check_carried, off_pin, paired
 from pbrl_mismatch.faults.repeats import stopped_poses, stopped_wrenches
 from pbrl_mismatch.faults.saturation import saturated
 from pbrl_mismatch.faults.sound import missing_notes
@@ -319,6 +319,31 @@ def test_a_body_that_turns_about_a_pin_in_the_gripper_is_held(sound: Recording) 
         assert pair is not None and off_pin(pair) < 0.01
         away = paired(stream_of(time, place[:1] + 0.0 * place, heading), stream_of(time, *parts(gripper)), 0.0, 10.0)
         assert away is not None and off_pin(away) > 0.1
+
+
+@pytest.mark.parametrize("offset", [(-0.09, 0.08), (0.15, 0.0)])
+def test_a_body_whose_tag_is_glued_on_elsewhere_goes_along_and_one_that_is_lost_does_not(
+    sound: Recording, offset: tuple[float, float]
+) -> None:
+    rng = np.random.default_rng(2)
+    time = np.arange(0.0, 12.0, 0.05)
+    gripper = np.column_stack([0.15 * np.sin(time), 0.04 * time, 1.2 * np.sin(0.9 * time)])
+    heading = 0.2 * np.sin(0.7 * time)  # the edge turns between the plates
+    (grasp,) = sound.grasps
+    contact = grasp.contact[:2]
+    corner = np.stack([np.cos(heading), -np.sin(heading), np.sin(heading), np.cos(heading)], -1).reshape(-1, 2, 2)
+    body = gripper[:, :2] - corner @ contact
+
+    def held(place: Array) -> Recording:
+        noisy = place + 0.002 * rng.standard_normal(place.shape)
+        told = with_table(with_gripper(sound, stream_of(time, *parts(gripper))), stream_of(time, noisy, heading))
+        return replace(told, grasps=(replace(grasp, start=0.0, end=time[-1]),))
+
+    check_carried(held(body + corner @ offset), "table")
+    left = time > 0.75 * time[-1]
+    lost = np.where(left[:, None], body[np.argmax(left)], body)
+    with pytest.raises(MismatchError, match=r"got one that is 0\.\d+ m off its hold, from t = 9\.\d+ s on"):
+        check_carried(held(lost), "table")
 
 
 def parts(pose: Array) -> tuple[Array, Array]:
