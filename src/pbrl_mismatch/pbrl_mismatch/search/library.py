@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.data.cuts import Cuts, cut_windows
 from pbrl_mismatch.data.track import Track
+from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import Peak, climb
@@ -89,7 +90,7 @@ def search_library(
     def begin_simulated(k: int) -> tuple[Hypothesis, Array]:
         (name, _, base, _), found = jobs[k], begun[k]
         if not is_another(name, base):
-            return found.hypothesis, _with_simulated_ground(found, base)
+            return found.hypothesis, _with_simulated_ground(found, EFFECTS[name], base)
         rng = np.random.default_rng(seeds[k].spawn(1)[0])
         two = parted_starts(rng, found.hypothesis, base, stages.fitted[0], options)
         return found.hypothesis, np.concatenate([two, found.coordinates])
@@ -174,19 +175,22 @@ def of_every_shape(jobs: Sequence[tuple[str, int]], chosen: Sequence[int]) -> li
     return [k for k, job in enumerate(jobs) if k in chosen or job in touching]
 
 
-def _with_simulated_ground(found: PathPeak, base: Fitted) -> Array:
-    """Return starts (n, K): what was found along the path, and the best of it on a ground with effects as simulated.
+def _with_simulated_ground(found: PathPeak, effect: Effect, base: Fitted) -> Array:
+    """Return starts (n, K): what was found along the path, and the best of it on its ground as that was simulated.
 
-    A path and a simulation have their tops apart, and a ground's was climbed to for long: a set that begins at the
-    path's, and ends below what it is laid on, had not the steps to come back.
+    A path and a simulation have their tops apart, and a ground's was climbed to for long: what begins at the path's,
+    and ends below what it is laid on, had not the steps to come back. The second best along the path makes room for it
+    but where a place or a rhythm is sought; on a mere kind of body those all go on, and nothing else.
     """
-    if not base.hypothesis.effects:
+    sought = effect.place is not None or effect.rhythm is not None
+    if sought and not base.hypothesis.effects:
         return found.coordinates
     columns, laid = found.hypothesis.columns, found.coordinates[:1].copy()
     for column, value in zip(base.hypothesis.columns, base.peak.coordinates[0], strict=True):
         if column in columns:
             laid[:, columns.index(column)] = value
-    return np.concatenate([found.coordinates, laid])
+    along = found.coordinates if sought else found.coordinates[:1]
+    return np.concatenate([along, laid])
 
 
 def _path_above_simulation(base: Fitted) -> float:
