@@ -216,8 +216,6 @@ class BagWriter:
         except OSError as error:
             raise self._fail(error) from error
         with self._lock:
-            if self._failure:
-                raise self._disk(self._failure)
             self._finish_chunk()
             for topic in self._metadata.topics.values():
                 following.announce(topic)
@@ -225,7 +223,9 @@ class BagWriter:
         return before
 
     def _finish_chunk(self) -> None:
-        """Finish the chunk in work; with the lock held."""
+        """Finish the chunk in work; with the lock held. After a failure nothing that is left in work is on the disk."""
+        if self._failure:
+            raise self._disk(self._failure)
         try:
             self._file.finish_chunk()
         except OSError as error:
