@@ -79,6 +79,14 @@ class Hypothesis:
             columns.append(np.log(np.maximum(value, 1e-12)) if parameter.positive else value)
         return np.column_stack(columns)
 
+    def laid_on(self, other: Hypothesis, coordinates: Array, own: Array) -> Array:
+        """Return coordinates (n, K) of its own with every column that another has, too, as that one has it (k,)."""
+        laid = own.copy()
+        for column, value in zip(other.columns, coordinates, strict=True):
+            if column in self.columns:
+                laid[:, self.columns.index(column)] = value
+        return laid
+
     def believable(self, coordinates: Array) -> Array:
         """Return coordinates (P, K) with those of effects brought back to where their priors are.
 

@@ -185,10 +185,7 @@ def _with_simulated_ground(found: PathPeak, effect: Effect, base: Fitted) -> Arr
     sought = effect.place is not None or effect.rhythm is not None
     if sought and not base.hypothesis.effects:
         return found.coordinates
-    columns, laid = found.hypothesis.columns, found.coordinates[:1].copy()
-    for column, value in zip(base.hypothesis.columns, base.peak.coordinates[0], strict=True):
-        if column in columns:
-            laid[:, columns.index(column)] = value
+    laid = found.hypothesis.laid_on(base.hypothesis, base.peak.coordinates[0], found.coordinates[:1])
     along = found.coordinates if sought else found.coordinates[:1]
     return np.concatenate([along, laid])
 

@@ -48,9 +48,7 @@ def parted_starts(
     columns = hypothesis.columns
     if base.noise_scale < 1.0 + BY_CHANCE / math.sqrt(2.0 * base.peak.objective.observations):
         return np.empty((0, len(columns)))
-    draws = hypothesis.sample_prior(rng, STARTS)
-    for column, value in zip(base.hypothesis.columns, base.peak.coordinates[0], strict=True):
-        draws[:, columns.index(column)] = value
+    draws = hypothesis.laid_on(base.hypothesis, base.peak.coordinates[0], hypothesis.sample_prior(rng, STARTS))
     scene = scene_of(shortest.track, base.row)
     draws = hypothesis.believable(with_splits(rng, draws, columns, scene.size))
     peak = climb(Objective(hypothesis, shortest, options.sensor_floor), draws, iterations=STEPS, rough=True)
