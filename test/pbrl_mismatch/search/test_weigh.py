@@ -16,17 +16,17 @@ from pbrl_mismatch.search.weigh import weigh
 OPTIONS = DiagnoseOptions()
 
 
-def fitted(variant: str, evidence: float, scale: float = 1.0, beside: float = 0.0) -> Any:
+def fitted(variant: str, evidence: float, unexplained: float = 0.0, beside: float = 0.0) -> Any:
     """Return what is weighed of a hypothesis, by its variant: its kind of baseline, then effects by number.
 
-    Of its evidence so much is beside the motion.
+    So much it leaves unexplained [nat]; of its evidence so much is beside the motion.
     """
     effects = tuple(part.split("/")[0] for part in variant.split(" + ")[1:])
     return SimpleNamespace(
         hypothesis=SimpleNamespace(effects=effects, variant=variant),
         evidence=evidence,
         of_motion=evidence - beside,
-        noise_scale=scale,
+        unexplained=unexplained,
     )
 
 
@@ -58,16 +58,34 @@ def test_two_effects_are_the_same_two_in_either_order() -> None:
     assert once["detent", "tether"] == pytest.approx(twice["detent", "tether"])
 
 
-def test_sets_that_differ_by_a_hundredth_of_the_noise_are_not_worlds_apart() -> None:
-    one, other = "free + tether/0 + floor_slope/0", "free + tether/0 + viscous_drag/0"
-    single = fitted("free + tether/0", 900.0)
-    found = weights(single, fitted(one, 1000.0, 1.014), fitted(other, 998.0, 1.016))
+TETHER, SLOPE, DRAG = "tether/0", "floor_slope/0", "viscous_drag/0"
+
+
+@pytest.mark.parametrize("unexplained", [0.0, 70.0])
+def test_one_effect_more_takes_more_than_a_wrong_law_leaves(unexplained: float) -> None:
+    def gained(more: float) -> float:
+        found = weights(
+            fitted(f"free + {TETHER}", 900.0, 2.0 * unexplained),
+            fitted(f"free + {SLOPE}", -50.0, 1000.0),
+            fitted(f"free + {TETHER} + {SLOPE}", 900.0 + more, unexplained),
+        )
+        return found["floor_slope", "tether"] - found["tether",]
+
+    # Of two that were tried, one; a twenty-fifth of what the first explains of the motion; and what both leave.
+    assert gained(200.0) == pytest.approx(200.0 - math.log(2.0) - 0.04 * 1000.0 - unexplained)
+    assert gained(300.0) - gained(200.0) == pytest.approx(100.0)
+
+
+def test_what_the_likeliest_set_leaves_counts_against_all_alike() -> None:
+    one, other = f"free + {TETHER} + {SLOPE}", f"free + {TETHER} + {DRAG}"
+    single = fitted(f"free + {TETHER}", 900.0)
+    found = weights(single, fitted(one, 1000.0, 30.0), fitted(other, 998.0, 40.0))
     assert found["floor_slope", "tether"] - found["tether", "viscous_drag"] == pytest.approx(
         2.0 + math.log(len(EFFECTS["viscous_drag"].variants))
     )
-    # Where even the likeliest falls short, one effect is enough.
-    short = weights(single, fitted(one, 1000.0, 1.2), fitted(other, 900.0, 1.014))
-    assert short["tether",] > short["floor_slope", "tether"] > short["tether", "viscous_drag"]
+    # A set that has no evidence leaves nothing that could count against others.
+    hopeless = weights(single, fitted(one, math.nan, math.nan))
+    assert math.isfinite(hopeless["tether",]) and hopeless["floor_slope", "tether"] == -math.inf
 
 
 def test_a_law_is_not_named_for_a_little_more_than_its_limit_explains() -> None:
@@ -96,13 +114,9 @@ def test_a_wheel_may_roll_on_bearings_or_slide(friction: float) -> None:
 def test_what_is_known_beside_the_motion_leaves_no_share_of_the_motion_to_others() -> None:
     # Poses of the gripper say that it gives way; a law of the motion beside it explains 60 nat there and all alone.
     gives, hinge = "free + grasp_compliance/0", "free + hidden_hinge/0"
-    both = fitted(f"{gives} + hidden_hinge/0", 160.0, 1.5, beside=200.0)
-    found = weights(fitted(gives, 100.0, 2.0, beside=200.0), fitted(hinge, -40.0, 1.5), both)
+    both = fitted(f"{gives} + hidden_hinge/0", 160.0, beside=200.0)
+    found = weights(fitted(gives, 100.0, beside=200.0), fitted(hinge, -40.0), both)
     assert max(found, key=lambda effects: found[effects]) == ("grasp_compliance", "hidden_hinge")
-    # The same gain in the motion alone is what a wrong law leaves to any other.
-    found = weights(fitted(gives, 100.0, 2.0), fitted(hinge, -40.0, 1.5), replaced(both, of_motion=160.0))
+    # A gain in the motion alone, where the first has explained a lot of it, is what a wrong law leaves to any other.
+    found = weights(fitted(gives, 2000.0), fitted(hinge, -40.0), fitted(both.hypothesis.variant, 2060.0))
     assert max(found, key=lambda effects: found[effects]) == ("grasp_compliance",)
-
-
-def replaced(one: Any, **changed: Any) -> Any:
-    return SimpleNamespace(**{**vars(one), **changed})

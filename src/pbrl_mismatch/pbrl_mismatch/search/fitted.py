@@ -144,6 +144,11 @@ class Fitted:
         simulated = math.exp(-0.5 * float(counts @ np.log(self.peak.weight[0]) / counts.sum()))
         return simulated if self.traced is None else min(simulated, self.traced.noise_scale)
 
+    @property
+    def unexplained(self) -> float:
+        """Return how much likelier its poses would be, were what it leaves of them no more than noise [nat]."""
+        return float(self.peak.objective.counts.sum()) * math.log(self.usual_scale)
+
 
 def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:
     """Cut a track into windows of every length, with blocks held out where it is long enough.

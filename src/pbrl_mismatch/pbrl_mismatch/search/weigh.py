@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,11 +16,8 @@ from pbrl_mismatch.search.fitted import Fitted
 VETO, VETO_SHARE = 8.0, 0.05
 """A hypothesis that predicts held-out windows worse than the baseline by this much [nat], and this share of what its
 evidence gained, is not named."""
-DISCREPANCY, SHORT_OF_IT = 0.04, 0.5
-"""Share of what a law explains that its being wrong may leave for others to explain: where the others then reach the
-noise floor, and where even they do not."""
-FLOOR = 1.015
-"""A set that needs less than this scale of the noise reaches the floor."""
+DISCREPANCY = 0.04
+"""Share of what a law explains that its being wrong may leave for others to explain."""
 REFINED = 0.01
 """Share of what a law explains that a law of which it is a limit has to explain beyond it."""
 JUDGED = 3
@@ -53,6 +50,10 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
     part, also those that were given up on the way: an effect of many laws is no likelier for having had a bad one fewer
     left. So do the kinds of baseline that are left under it.
 
+    Several effects together have to explain more of the motion, beyond the best of their parts, than what a law that is
+    a little wrong leaves for any other to take: a share of what that part explains, and as much as the likeliest set of
+    so many leaves unexplained.
+
     Args:
         bases: kinds of baseline, fitted.
         tried: hypotheses with effects.
@@ -64,16 +65,17 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
     singles = max(sum(len(key) == 1 for key in groups), 1)
     none = max(base.evidence for base in bases)
     best = {key: max(members, key=_evidence) for key, members in groups.items()}
-    shares = {size: _discrepancy([best[key] for key in groups if len(key) == size]) for size in set(map(len, groups))}
+    left = {
+        size: _unexplained(each for key, each in best.items() if len(key) == size) for size in set(map(len, groups))
+    }
     entries = []
     for key, members in groups.items():
         prior = math.log(options.none_odds) if not key else -len(key) * math.log(singles)
         weight = prior + _averaged(members, np.array([_evidence(member) for member in members]))
         if len(key) > 1:
-            # A law that is a little wrong leaves a share of what it explains of the motion, which any other may take.
             parts = [best[other] for other in groups if other and set(other) < set(key)]
             known = max((_of_motion(part) for part in parts), default=-math.inf)
-            weight -= shares[len(key)] * max(known - _of_motion(best[()]), 0.0)
+            weight -= DISCREPANCY * max(known - _of_motion(best[()]), 0.0) + left[len(key)]
         limits = [_evidence(best[other]) for other in _limits(key) if other in groups]
         weight -= REFINED * max(max(limits, default=none) - none, 0.0)
         entries.append(Weighed(key, best[key], weight, 0.0, False))
@@ -90,13 +92,13 @@ def _of_motion(fitted: Fitted) -> float:
     return fitted.of_motion if math.isfinite(fitted.of_motion) else -math.inf
 
 
-def _discrepancy(sets: Sequence[Fitted]) -> float:
-    """Return the share that a set of so many effects must explain beyond its parts.
+def _unexplained(sets: Iterable[Fitted]) -> float:
+    """Return what the likeliest of some sets leaves unexplained [nat].
 
-    It is the same for all of them, by whether the likeliest reaches the noise floor: two sets whose scales differ by a
-    hundredth would else be hundreds of nats apart.
+    It counts against all of them alike: that one explains more than another is in their evidence already.
     """
-    return DISCREPANCY if max(sets, key=_evidence).noise_scale < FLOOR else SHORT_OF_IT
+    likeliest = max(sets, key=_evidence)
+    return likeliest.unexplained if math.isfinite(likeliest.evidence) else 0.0
 
 
 def _limits(effects: tuple[str, ...]) -> list[tuple[str, ...]]:

@@ -1,0 +1,30 @@
+"""What a fitted hypothesis tells of what it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from pbrl_bag.types import Recording
+from pbrl_mismatch import track_of
+from pbrl_mismatch.data.cuts import cut_windows
+from pbrl_mismatch.search.climb import climb
+from pbrl_mismatch.search.fitted import Fitted
+from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
+from pbrl_mismatch.search.objective import Objective
+
+
+def test_what_is_unexplained_is_what_its_likelihood_lacks_to_that_of_noise(
+    concealed_recording: Callable[..., Recording],
+) -> None:
+    track = track_of(concealed_recording("floor_slope", 1), "table")
+    free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.02), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    objective = Objective(free, cut_windows(track, 2.0), 0.15)
+    level = Fitted(free, climb(objective, free.mean[None], iterations=4), None)
+    # A window that is explained down to the noise has no more misfit than numbers; below, its likelihood is as it is.
+    noise = np.minimum(level.peak.misfit, objective.counts)
+    lacks = objective.likelihood(noise) - objective.likelihood(level.peak.misfit)
+    assert level.unexplained == pytest.approx(float(lacks[0]), rel=1e-9)
+    assert level.unexplained > 100.0
