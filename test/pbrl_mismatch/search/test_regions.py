@@ -9,12 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from concealed_cases import concealed, on_the_way
 from numpy.typing import NDArray
 
 from pbrl_bag.types import Recording
-from pbrl_mismatch import track_of
+from pbrl_mismatch import DiagnoseOptions, track_of
+from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
+from pbrl_mismatch.search.fitted import cut_stages, fit_baseline
+from pbrl_mismatch.search.hypothesis import OF_FRICTION, BaselineOptions, baselines
+from pbrl_mismatch.search.path.ground import ground_of
 from pbrl_mismatch.search.path.regions import SLIDES, tile_friction, with_regions
 
 WEIGHT = 196.0
@@ -85,3 +90,28 @@ def test_rectangles_lie_about_the_tiles_that_hold() -> None:
     assert middle[:2] == pytest.approx([0.5, -0.3], abs=0.05)
     assert np.exp(middle[2:4]) == pytest.approx([0.75, 0.35], abs=0.1)
     assert middle[4] == pytest.approx(turn, abs=0.1)
+
+
+@pytest.mark.parametrize("heavier", [1.0, 8.0])
+def test_a_ground_that_a_patch_has_bent_still_says_where_the_patch_is(
+    concealed_recording: Callable[..., Recording], heavier: float
+) -> None:
+    seed, options = 8, DiagnoseOptions()
+    patch = on_the_way("floor_patch", concealed("floor_patch", np.random.default_rng([seed, 7])), seed)
+    track = track_of(concealed_recording("floor_patch", seed), "table")
+    believed = BaselineOptions(WEIGHT / 9.81, 0.1, 0.1, 0.02)
+    wheel = baselines(believed, ["wheel"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    base = fit_baseline(np.random.default_rng(0), track, wheel, cut_stages(track, options), options)
+    ground = ground_of(wheel, base.peak.coordinates[0], cut_windows(track, 2.0), options.sensor_floor)
+    # What holds a body is easily taken for its weight; a wheel's friction then is as much less of that.
+    bent = ground.coordinates + np.log(heavier) * (
+        np.array([column == "mass" for column in wheel.columns], dtype=float) - np.isin(wheel.columns, OF_FRICTION)
+    )
+    tiles, friction = tile_friction(track, replace(ground, coordinates=bent).believed, WEIGHT)
+    x, y, turn = track.seen[0, :3]
+    c, s = math.cos(turn), math.sin(turn)
+    own = (tiles - [x, y]) @ np.array([[c, -s], [s, c]])
+    inside = np.all(np.abs(own - [patch["x"], patch["y"]]) < patch["half"] + 0.1, axis=1)
+    assert inside.any()
+    assert not inside.all()
+    assert friction[inside].mean() > 3.0 * friction[~inside].mean()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.search.fitted import cut_stages, fit_from
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.path.ground import ground_of
-from pbrl_mismatch.search.path.starts import starts_of
+from pbrl_mismatch.search.path.starts import each_first, starts_of
 
 OPTIONS = DiagnoseOptions()
 BIAS = np.array([0.4, 3.0, 0.2])
@@ -46,3 +47,16 @@ def test_the_moment_that_a_sensor_s_offset_comes_is_found(clean: Any, share: flo
     assert told["bias_start"] == pytest.approx(since, abs=0.25)
     assert [told["bias_x"], told["bias_y"]] == pytest.approx(BIAS[:2].tolist(), abs=0.4)
     assert found.noise_scale < 1.1
+
+
+def test_each_group_s_likeliest_come_first_and_all_others_after() -> None:
+    rng = np.random.default_rng(3)
+    for counts in ([3, 4], [5], [2, 1, 6]):
+        evidence = rng.normal(size=sum(counts))
+        order = each_first(evidence, counts)
+        assert sorted(order) == list(range(len(evidence)))
+        edges = np.cumsum([0, *counts])
+        leads = {int(a + np.argmax(evidence[a:b])) for a, b in pairwise(edges)}
+        assert set(order[: len(counts)].tolist()) == leads
+        for part in (order[: len(counts)], order[len(counts) :]):
+            assert np.all(np.diff(evidence[part]) <= 0.0)

@@ -17,7 +17,7 @@ from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart_rows, judged
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
-from pbrl_mismatch.search.hypothesis import BELIEVED, BENT, Hypothesis
+from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
 from pbrl_mismatch.search.library import search_library, trace
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.ground import traced
@@ -262,7 +262,7 @@ def _starts(fitted: Fitted, best: Fitted) -> tuple[Array, Array]:
     if hypothesis.effects:
         # What the best one bent of mass and delay may be the very thing that another effect explains.
         bent = np.isin(hypothesis.columns, list(BELIEVED))
-        starts += [(_afresh(hypothesis, own), begins), (np.where(bent, own, crossed), begun)]
+        starts += [(hypothesis.as_believed(own), begins), (np.where(bent, own, crossed), begun)]
     # Laws that are one another's limits share more than the body: ground friction is breakaway friction without.
     alike = _crossed(hypothesis, own, best.hypothesis, reached, all_shared=True)
     if np.any(alike != crossed):
@@ -289,12 +289,6 @@ def _crossed(
         if column in other.columns and column not in effect:
             crossed[k] = coordinates[other.columns.index(column)]
     return crossed
-
-
-def _afresh(hypothesis: Hypothesis, own: Array) -> Array:
-    """Return the coordinates (K,) of a hypothesis with what a wrong ground bends as it was believed to be."""
-    bent = np.array([column in BENT for column in hypothesis.columns])
-    return np.where(bent, hypothesis.mean, own)
 
 
 def held_against(explained: Explained, baseline: Fitted, options: DiagnoseOptions) -> tuple[Weighed, ...]:

@@ -16,7 +16,7 @@ from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import Peak, climb
 from pbrl_mismatch.search.heldout import Score, held_out_score
-from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
+from pbrl_mismatch.search.hypothesis import BELIEVED, OF_FRICTION, Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.along import lay_along
 from pbrl_mismatch.search.path.climb import climb_along
@@ -30,7 +30,6 @@ BASELINE_STARTS, BASELINE_STEPS, KEPT_OF_BASELINE = 20, 6, 4
 """A baseline is climbed along the path from so many starts, in so many steps; so many go on to windows."""
 WHOLE = 4
 """Steps from the best of the kept windows to that of all."""
-OF_FRICTION = frozenset({"mu_x", "mu_y"})
 FELT = 0.1, 1.0
 """Friction of a wheel over the body's weight that a baseline is climbed from, and the spread of its logarithm."""
 MOVING = 0.02
@@ -229,7 +228,32 @@ def apart_rows(coordinates: Array, spread: Array, count: int) -> NDArray[np.int6
 def fit_baseline(
     rng: np.random.Generator, track: Track, hypothesis: Hypothesis, stages: Stages, options: DiagnoseOptions
 ) -> Fitted:
-    """Fit one kind of baseline from draws of its prior and from what the motion alone suggests."""
+    """Fit one kind of baseline from draws of its prior and from what the motion alone suggests.
+
+    What it lacks bends what is believed of a body, and then the rest: it is climbed a second time from what it is with
+    that held, which is often better.
+    """
+    starts = _baseline_starts(rng, track, hypothesis)
+    mass = float(hypothesis.base[COLUMN["mass"]])
+    along = lay_along(cut_windows(track, max(options.windows)), track.seen, mass, options.sensor_floor, FINE)
+
+    def climbed(kind: Hypothesis, starts: Array) -> Fitted:
+        found = climb_along(along, kind, starts, BASELINE_STEPS)
+        order = np.argsort(-found.evidence, kind="stable")
+        kept = apart(found.coordinates[order], kind.spread, KEPT_OF_BASELINE)
+        return fit_from(kind, stages, kept, options.model_copy(update={"candidates": len(kept)}))
+
+    found, held = climbed(hypothesis, starts), hypothesis.fixed(BELIEVED)
+    if len(held.parameters) in (0, len(hypothesis.parameters)):
+        return found
+    firm = climbed(held, held.coordinates(hypothesis.rows(starts)))
+    reached = [firm.peak.coordinates[0], *([] if firm.short is None else [firm.short])]
+    again = [hypothesis.laid_on(held, each, hypothesis.mean[None]) for each in reached]
+    return max((found, fit_from(hypothesis, stages, np.concatenate(again), options)), key=lambda each: each.evidence)
+
+
+def _baseline_starts(rng: np.random.Generator, track: Track, hypothesis: Hypothesis) -> Array:
+    """Return starts (n, K) of a baseline: draws of its prior, some with a wheel where the motion has an axle."""
     starts = hypothesis.sample_prior(rng, BASELINE_STARTS)
     columns = hypothesis.columns
     for k, name in enumerate(columns):
@@ -247,13 +271,7 @@ def fit_baseline(
         starts[3:6, [x, y]] = place
         if "wheel_theta" in columns:
             starts[3:6, columns.index("wheel_theta")] = angle
-    mass = float(hypothesis.base[COLUMN["mass"]])
-    along = lay_along(cut_windows(track, max(options.windows)), track.seen, mass, options.sensor_floor, FINE)
-    found = climb_along(along, hypothesis, starts, BASELINE_STEPS)
-    order = np.argsort(-found.evidence, kind="stable")
-    starts = apart(found.coordinates[order], hypothesis.spread, KEPT_OF_BASELINE)
-    wide = options.model_copy(update={"candidates": len(starts)})
-    return fit_from(hypothesis, stages, starts, wide)
+    return starts
 
 
 def hinge_guess(track: Track) -> dict[str, float] | None:

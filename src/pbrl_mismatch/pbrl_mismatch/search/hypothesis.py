@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,8 +21,12 @@ OF_THE_BODY = frozenset({*KERNEL_COLUMNS, "inertia_factor", "delay"})
 """Columns of a baseline."""
 BELIEVED = frozenset({"mass", "inertia_factor", "delay", "sensor_turn", "com_x", "com_y"})
 """Columns of a baseline of which something is known beforehand."""
-BENT = BELIEVED | {"mu_x", "mu_y"}
+OF_FRICTION = ("mu_x", "mu_y")
+"""Columns of a wheel's friction along its axes, over the body's weight."""
+BENT = BELIEVED | set(OF_FRICTION)
 """Columns of a ground that bend to what it lacks: half of the starts have them as they were believed to be."""
+HOLDS = 1.5
+"""A wheel that holds a body has a friction at most so many deviations above the prior's mean."""
 SHARE = 1e-2
 """Of a prior's spread: friction is solved for only so exactly, and a finite difference must be well above that."""
 OF_A_WHEEL = 0.03, 2.0
@@ -96,6 +100,25 @@ class Hypothesis:
         reach = np.array([math.inf if column in OF_THE_BODY else FURTHEST for column in self.columns]) * self.spread
         reach = np.minimum(reach, [parameter.furthest for parameter in self.parameters])
         return np.clip(coordinates, self.mean - reach, self.mean + reach)
+
+    def as_believed(self, coordinates: Array) -> Array:
+        """Return coordinates (K,) with what bends to an effect that is lacking as it was believed to be before.
+
+        A wheel's friction is a force that is told over the weight: with a mass that is believed again it stays the
+        force that it was. What of a body that was taken for many times as heavy kept the wheel from going sideways
+        would else hold nothing.
+        """
+        found = np.where(np.isin(self.columns, list(BENT)), self.mean, coordinates)
+        if "mass" in self.columns and "mu_y" in self.columns:
+            mass, *axes = (self.columns.index(column) for column in ("mass", *OF_FRICTION))
+            force = coordinates[axes] + coordinates[mass] - self.mean[mass]
+            found[axes] = np.minimum(force, self.mean[axes] + HOLDS * self.spread[axes])
+        return found
+
+    def fixed(self, columns: Collection[str]) -> Hypothesis:
+        """Return this with some columns no longer free, at the centre of their priors."""
+        base = self.rows(self.mean[None])[0]
+        return replace(self, parameters=tuple(p for p in self.parameters if p.column not in columns), base=base)
 
     def sample_prior(self, rng: np.random.Generator, count: int) -> Array:
         """Draw (count, K) coordinates."""

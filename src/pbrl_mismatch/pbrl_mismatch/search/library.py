@@ -19,6 +19,7 @@ from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import Peak, climb
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart
 from pbrl_mismatch.search.grip import GripEvidence
+from pbrl_mismatch.search.held import held_starts, holds
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.climb import PathPeak
@@ -36,8 +37,8 @@ AS_GOOD = 40.0
 CLOSE = (20.0, 10.0)
 """Effects this near to the likeliest [nat] all go on: from the path to windows, and from those to longer ones."""
 RESTLESS = 1.12
-"""Where no law needs less than this scale of the noise along the path, bodies stick: dry friction is then simulated
-whatever the path says of it."""
+"""Where no law needs less than this scale of the noise along the path, bodies stick: what holds or stops them is then
+simulated whatever the path says of it, and begins also where short simulations have it."""
 UNTOLD = 50.0
 """Where a ground is likelier along its path than simulated by more [nat], every effect is simulated: friction stands in
 for what holds the body, and its path alone does not tell them apart."""
@@ -88,12 +89,16 @@ def search_library(
         return starts_of(np.random.default_rng(seeds[k]), *jobs[k], options)
 
     def begin_simulated(k: int) -> tuple[Hypothesis, Array]:
-        (name, _, base, _), found = jobs[k], begun[k]
-        if not is_another(name, base):
-            return found.hypothesis, _with_simulated_ground(found, EFFECTS[name], base)
+        (name, variant, base, ground), found = jobs[k], begun[k]
         rng = np.random.default_rng(seeds[k].spawn(1)[0])
-        two = parted_starts(rng, found.hypothesis, base, stages.fitted[0], options)
-        return found.hypothesis, np.concatenate([two, found.coordinates])
+        if is_another(name, base):
+            two = parted_starts(rng, found.hypothesis, base, stages.fitted[0], options)
+            return found.hypothesis, np.concatenate([two, found.coordinates])
+        starts = _with_simulated_ground(found, EFFECTS[name], base)
+        if restless and holds(name):
+            held = held_starts(rng, found.hypothesis, variant, base, ground, stages.fitted[0], options)
+            starts = np.concatenate([held, starts])
+        return found.hypothesis, starts
 
     with ThreadPoolExecutor(options.workers) as pool:
         begun = list(pool.map(begin, range(len(jobs))))
@@ -113,8 +118,9 @@ def search_library(
         stands_in = any(_path_above_simulation(base) > UNTOLD for base in bases)
         most = len(EFFECTS) if stands_in else options.shortlist
         chosen = _survivors(laid, on_path, most, CLOSE[0])
-        if min(each.noise_scale for each in begun) > RESTLESS:
-            chosen = sorted({*chosen, *(k for k, (name, *_) in enumerate(jobs) if EFFECTS[name].sticks)})
+        restless = min(each.noise_scale for each in begun) > RESTLESS
+        if restless:
+            chosen = sorted({*chosen, *(k for k, (name, *_) in enumerate(jobs) if holds(name))})
         asked = [k for k, (_, _, base, _) in enumerate(jobs) if base is bases[0] or not base.hypothesis.effects]
         pins = [k for k in asked if EFFECTS[jobs[k][0]].pins and may_be_pinned(longest.track)]
         # A pin is so stiff that a path a millimetre off says nothing of it; and the first of two wheels has taken on
@@ -122,8 +128,14 @@ def search_library(
         chosen = sorted({*chosen, *pins, *(k for k in asked if is_another(jobs[k][0], jobs[k][2]))})
         chosen = of_every_shape([(name, id(base)) for name, _, base, _ in jobs], chosen)
         running = list(pool.map(begin_simulated, chosen))
-        # Short windows rank ways to part a wheel no better than the path does: several go on.
-        kept = {hypothesis.variant: KEPT for hypothesis, starts in running if len(starts) > options.keep[0]}
+        # Short windows rank ways to part a wheel no better than the path does: several go on. Of what holds a body
+        # they tell.
+        told = {k for k in chosen if restless and holds(jobs[k][0]) and not is_another(jobs[k][0], jobs[k][2])}
+        kept = {
+            hypothesis.variant: KEPT
+            for k, (hypothesis, starts) in zip(chosen, running, strict=True)
+            if len(starts) > options.keep[0] and k not in told
+        }
         first = _survivors(laid, on_path, LEADING, 0.0)
         leading = {begun[k].hypothesis.variant for k in (*first, *pins)} | set(kept)
         before: list[Peak | None] = [None] * len(running)

@@ -65,9 +65,8 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
     singles = max(sum(len(key) == 1 for key in groups), 1)
     none = max(base.evidence for base in bases)
     best = {key: max(members, key=_evidence) for key, members in groups.items()}
-    left = {
-        size: _unexplained(each for key, each in best.items() if len(key) == size) for size in set(map(len, groups))
-    }
+    sizes = {len(key) for key in groups if len(key) > 1}
+    left = {size: _unexplained(each for key, each in best.items() if len(key) == size) for size in sizes}
     entries = []
     for key, members in groups.items():
         prior = math.log(options.none_odds) if not key else -len(key) * math.log(singles)

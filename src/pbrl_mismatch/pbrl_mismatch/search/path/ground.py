@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
 from pbrl_mismatch.kernels.columns import COLUMN
-from pbrl_mismatch.search.hypothesis import BENT, Hypothesis, step_sizes
+from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
 from pbrl_mismatch.search.path.along import Along, as_seen_path, lay_along
 from pbrl_mismatch.search.path.climb import climb_along, weights
 
@@ -69,9 +69,8 @@ class Ground:
     @cached_property
     def believed(self) -> ResidualWrench:
         """Return what it would lack with mass and friction as was believed: what it lacks has bent them."""
-        bent = np.isin(self.hypothesis.columns, list(BENT))
-        row = self.hypothesis.rows(np.where(bent, self.hypothesis.mean, self.coordinates)[None])[0]
-        return residual_wrench(self.cuts.track, row)
+        believed = self.hypothesis.as_believed(self.coordinates)
+        return residual_wrench(self.cuts.track, self.hypothesis.rows(believed[None])[0])
 
     def along(self, stride: int) -> Along:
         """Return the windows along its path."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.fitted import Fitted, apart, scene_of
-from pbrl_mismatch.search.hypothesis import BENT, Hypothesis
+from pbrl_mismatch.search.hypothesis import BENT, OF_FRICTION, Hypothesis
 from pbrl_mismatch.search.path.climb import PathPeak, climb_along
 from pbrl_mismatch.search.path.contacts import contact_points, with_contacts
 from pbrl_mismatch.search.path.ground import Ground
@@ -49,7 +51,7 @@ def starts_of(
     """
     effect = EFFECTS[name]
     hypothesis = base.hypothesis.with_effect(effect, scene_of(ground.cuts.track, base.row), variant)
-    draws, afresh = _drawn(rng, hypothesis, effect, variant, base, ground, options)
+    draws, afresh = drawn(rng, hypothesis, effect, variant, base, ground, options)
     ranked, misfit = screen(ground, hypothesis, effect, draws)
     searched = _searched(effect, variant)
     # Edges in time and borders are met by few draws and felt from nearby only: the best ones are drawn about again.
@@ -62,9 +64,10 @@ def starts_of(
         ranked, misfit = np.concatenate([ranked, again]), np.concatenate([misfit, rest])
         afresh = np.concatenate([afresh, afresh[parents]])
     halves = [half for half in (~afresh, afresh) if half.any()]
-    starts = np.concatenate([_best_of(ranked, misfit, half, hypothesis, options) for half in halves])
-    begun = climb_along(ground.climbed if effect.remembers else ground.first.along, hypothesis, starts, BEGUN)
-    best = begun.coordinates[np.argsort(-begun.evidence, kind="stable")]
+    starts = [_best_of(ranked, misfit, half, hypothesis, options) for half in halves]
+    along = ground.climbed if effect.remembers else ground.first.along
+    begun = climb_along(along, hypothesis, np.concatenate(starts), BEGUN)
+    best = begun.coordinates[each_first(begun.evidence, [len(each) for each in starts])]
     return climb_along(ground.climbed, hypothesis, apart(best, hypothesis.spread, options.keep[0]), CLIMBED)
 
 
@@ -73,7 +76,7 @@ def _searched(effect: Effect, variant: int) -> list[str]:
     return [column for column in effect.variants[variant] if column not in effect.linear]
 
 
-def _drawn(
+def drawn(
     rng: np.random.Generator,
     hypothesis: Hypothesis,
     effect: Effect,
@@ -89,14 +92,16 @@ def _drawn(
         count = max(count // 4, 8)  # each costs twice as much, and its place is not to be found
     draws = hypothesis.sample_prior(rng, count)
     afresh = np.arange(len(draws)) % 2 == 1
+    believed = ground.hypothesis.as_believed(ground.coordinates)
     for k, column in enumerate(columns):
-        if column in base.hypothesis.columns:
+        if column in ground.hypothesis.columns:
             # What an effect did, the ground has taken on as far as it could: half begin at what was believed before.
-            draws[:, k] = np.where(
-                afresh & (column not in kept),
-                hypothesis.mean[k] if column in BENT else draws[:, k],
-                ground.coordinates[base.hypothesis.columns.index(column)],
-            )
+            own = ground.hypothesis.columns.index(column)
+            before = np.full(count, believed[own]) if column in BENT else draws[:, k]
+            if column in OF_FRICTION:
+                # The wheel's friction too: half of those begin with a wheel that rolls.
+                before[1::4] = min(believed[own], hypothesis.mean[k])
+            draws[:, k] = np.where(afresh & (column not in kept), before, ground.coordinates[own])
     for half, lacks in ((~afresh, ground.lacks), (afresh, ground.believed)):
         draws[half] = _placed(rng, draws[half], columns, effect, track, lacks)
     if effect.second and "wheel_x" in columns:
@@ -147,6 +152,18 @@ def _first_of(misfit: Array, among: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the rows of the least misfits among some."""
     rows = np.flatnonzero(among)
     return np.asarray(rows[np.argsort(misfit[rows], kind="stable")][:PARENTS], dtype=np.int64)
+
+
+def each_first(evidence: Array, counts: Sequence[int]) -> NDArray[np.int64]:
+    """Return the order of points in groups of so many: the likeliest of each group, then all others, likeliest first.
+
+    Along a bent ground's path what begins afresh has further to go, and is where the effect is.
+    """
+    group = np.repeat(np.arange(len(counts)), counts)
+    order = np.argsort(-evidence, kind="stable")
+    _, leads = np.unique(group[order], return_index=True)
+    behind = np.isin(np.arange(len(order)), leads, invert=True)
+    return np.asarray(order[np.argsort(behind, kind="stable")], dtype=np.int64)
 
 
 def _best_of(
