@@ -21,7 +21,7 @@ from pbrl_mismatch.search.path.starts import drawn
 
 Array = NDArray[np.float64]
 
-CLIMBED, STEPS = 6, 4
+CLIMBED, STEPS = 4, 4
 """So many of the likeliest draws are climbed from, in so many steps."""
 KEPT = 2
 """So many of them go on."""
