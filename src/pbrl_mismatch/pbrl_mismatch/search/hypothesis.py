@@ -109,7 +109,7 @@ class Hypothesis:
         would else hold nothing.
         """
         found = np.where(np.isin(self.columns, list(BENT)), self.mean, coordinates)
-        if "mass" in self.columns and "mu_y" in self.columns:
+        if {"mass", *OF_FRICTION} <= set(self.columns):
             mass, *axes = (self.columns.index(column) for column in ("mass", *OF_FRICTION))
             force = coordinates[axes] + coordinates[mass] - self.mean[mass]
             found[axes] = np.minimum(force, self.mean[axes] + HOLDS * self.spread[axes])

@@ -127,13 +127,13 @@ def search_library(
         # what both do, so that along its path the second has nothing to explain.
         chosen = sorted({*chosen, *pins, *(k for k in asked if is_another(jobs[k][0], jobs[k][2]))})
         chosen = of_every_shape([(name, id(base)) for name, _, base, _ in jobs], chosen)
-        told = {k for k in chosen if restless and k in asked and holds(jobs[k][0])}
+        told = {k for k in asked if restless and holds(jobs[k][0]) and not is_another(jobs[k][0], jobs[k][2])}
         running = list(pool.map(begin_simulated, chosen))
         # Short windows rank ways to part a wheel no better than the path does: several go on. Of what holds they tell.
         kept = {
             hypothesis.variant: KEPT
             for k, (hypothesis, starts) in zip(chosen, running, strict=True)
-            if len(starts) > options.keep[0] and (k not in told or is_another(jobs[k][0], jobs[k][2]))
+            if len(starts) > options.keep[0] and k not in told
         }
         first = _survivors(laid, on_path, LEADING, 0.0)
         leading = {begun[k].hypothesis.variant for k in (*first, *pins)} | set(kept)
