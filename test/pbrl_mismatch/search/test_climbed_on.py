@@ -14,7 +14,7 @@ from pbrl_mismatch import EFFECTS, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.explain import _parts_led, _starts
+from pbrl_mismatch.search.climbed_on import parts_led, starts_from
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
@@ -39,7 +39,7 @@ def fitted(concealed_recording: Callable[..., Recording]) -> Any:
 
 def test_one_start_is_where_it_is(fitted: Any) -> None:
     for own, other in (fitted, fitted[::-1]):
-        there = climb(own.peak.objective, *_starts(own, other), iterations=0)
+        there = climb(own.peak.objective, *starts_from(own, other), iterations=0)
         assert there.evidence[0] == pytest.approx(float(own.peak.evidence[0]), abs=1e-6)
 
 
@@ -49,7 +49,7 @@ def test_what_another_effect_does_nothing_to_is_told_as_well_without_it(fitted: 
     slope = ~np.isin(sloped.hypothesis.columns, free.hypothesis.columns)
     flat[0, slope] = sloped.hypothesis.mean[slope]
     nothing = Fitted(sloped.hypothesis, climb(sloped.peak.objective, flat, sloped.peak.nuisance, iterations=0), None)
-    led = climb(free.peak.objective, *_starts(free, nothing), iterations=0)
+    led = climb(free.peak.objective, *starts_from(free, nothing), iterations=0)
     assert led.misfit[1] == pytest.approx(nothing.peak.misfit[0], rel=1e-9)
 
 
@@ -68,7 +68,7 @@ def test_parts_of_a_set_are_led_to_where_it_has_them_and_nothing_else_is(fitted:
     short = replace(sloped, peak=climb(sloped.peak.objective, began, iterations=0))
     other = with_effects(short, "detent")
     weighed = in_order(with_effects(sloped, "floor_slope", "time_offset"))
-    led = _parts_led(weighed, [short, other], stages, options)
+    led = parts_led(weighed, [short, other], stages, options)
     assert led[0].evidence >= sloped.evidence - 1e-6 > short.evidence
     assert led[1] is other
 
@@ -79,7 +79,7 @@ def test_every_set_that_explains_more_leads_whatever_the_likeliest_is(fitted: An
     short = replace(sloped, peak=climb(sloped.peak.objective, sloped.hypothesis.mean[None], iterations=0))
     stuck = with_effects(short, "floor_slope", "time_offset")
     found = with_effects(sloped, "floor_slope", "detent")
-    led = _parts_led(in_order(short, stuck, found), [short], stages, options)[0]
+    led = parts_led(in_order(short, stuck, found), [short], stages, options)[0]
     assert led.evidence >= sloped.evidence - 1e-6 > short.evidence
 
 
@@ -89,5 +89,5 @@ def test_a_hold_that_gives_way_leads_nothing(fitted: Any) -> None:
     short = replace(sloped, peak=climb(sloped.peak.objective, sloped.hypothesis.mean[None], iterations=0))
     tried = [short, with_effects(sloped, GRASP_COMPLIANCE)]
     weighed = in_order(with_effects(sloped, "floor_slope", GRASP_COMPLIANCE))
-    led = _parts_led(weighed, tried, stages, options)
+    led = parts_led(weighed, tried, stages, options)
     assert all(one is other for one, other in zip(led, tried, strict=True))

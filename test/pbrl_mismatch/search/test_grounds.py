@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from pbrl_mismatch import DiagnoseOptions
+from pbrl_mismatch.search.climbed_on import LED
 from pbrl_mismatch.search.explain import (
     GROUNDS_OF_SETS,
-    LED,
     OF_THE_BEST,
     WORTH_A_KIND,
     _grounds,

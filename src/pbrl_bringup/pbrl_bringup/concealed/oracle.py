@@ -25,7 +25,7 @@ from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.diagnose import fit_baselines, track_of
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_mismatch.search.explain import led
+from pbrl_mismatch.search.climbed_on import led
 from pbrl_mismatch.search.fitted import Fitted, Stages, cut_stages, fit_from, judged, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way, grip_evidence
 from pbrl_mismatch.search.hypothesis import BaselineOptions, Hypothesis, baselines

@@ -1,0 +1,169 @@
+"""Hypotheses climbed on from where others have what they share: the body's own parameters, or an effect's."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrl_mismatch.effects.registry import EFFECTS
+from pbrl_mismatch.options import DiagnoseOptions
+from pbrl_mismatch.search.climb import climb
+from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart_rows
+from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
+from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
+from pbrl_mismatch.search.objective import Objective
+from pbrl_mismatch.search.path.ground import traced
+from pbrl_mismatch.search.weigh import Weighed
+
+Array = NDArray[np.float64]
+
+POLISHED, POLISHED_OF_SETS, LONGER = 5, 3, 2
+"""So many of the likeliest effects, and of the likeliest sets, are climbed on, for so many times the usual steps."""
+TRIED_OUT, GO_ON = 4, 4
+"""Steps that every start of a climb on has, and how many starts go on from there."""
+EXPLAINS = 10.0
+"""What is likelier than the baseline by more explains something [nat]."""
+LEADS = 3
+"""So many of the likeliest effects lead a baseline to where they have the body's own parameters, and so many of the
+sets that explain most lead their parts."""
+LED = 100.0
+"""Kinds of baseline that are worse than the best by more [nat] are not led: no other top would do. Nor are effects
+tried on richer kinds than the best that are."""
+FREEDOM = 1.0
+"""An effect that says nothing is less likely than the baseline by about so much at least, for its freedom [nat]."""
+FAINT = 2.0
+"""What a law has that its limit has not begins so many deviations of its prior below the mean."""
+
+
+def led(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: DiagnoseOptions) -> list[Fitted]:
+    """Return the baselines climbed on from where likely effects have mass and wheel, best first.
+
+    Where bodies stick there are many tops. An effect that does nothing but lead to a better one explains nothing.
+    """
+    likely = sorted((each for each in tried if GRASP_COMPLIANCE not in each.hypothesis.effects), key=_lowest)[:LEADS]
+    best, climbed = max(base.evidence for base in bases), []
+    for base in bases:
+        found = base
+        for each in likely if base.evidence > best - LED else []:
+            # One that is no likelier for all its freedom has found no better top.
+            found = _climbed_on(found, each, stages, options) if each.evidence > found.evidence - FREEDOM else found
+        climbed.append(found)
+    return sorted(climbed, key=_lowest)
+
+
+def _lowest(fitted: Fitted) -> float:
+    return -fitted.evidence
+
+
+def polished(
+    weighed: tuple[Weighed, ...], tried: list[Fitted], stages: Stages, options: DiagnoseOptions, most: int = POLISHED
+) -> list[Fitted]:
+    """Return what was tried, the likeliest climbed on, also from what the best one has for the baseline's parameters.
+
+    A law that is right may be held up where the wrong baseline put it: mass and wheel are then where another law, which
+    explains much too, has found them.
+    """
+    best = next((each.fitted for each in weighed if each.effects and GRASP_COMPLIANCE not in each.effects), None)
+    if best is None:
+        return tried
+    none = max((each.fitted.evidence for each in weighed if not each.effects), default=-math.inf)
+    # Where nothing explains anything yet, a law that is right may still be on its way: all go on.
+    names = [each.effects for each in weighed if each.effects][: most if best.evidence > none + EXPLAINS else None]
+    chosen = {id(each.fitted) for each in weighed if each.effects in names}
+    jobs = [each for each in tried if id(each) in chosen and GRASP_COMPLIANCE not in each.hypothesis.effects]
+    with ThreadPoolExecutor(options.workers) as pool:
+        better = dict(
+            zip(map(id, jobs), pool.map(lambda each: _climbed_on(each, best, stages, options), jobs), strict=True)
+        )
+    return [better.get(id(each), each) for each in tried]
+
+
+def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseOptions) -> Fitted:
+    """Return a hypothesis climbed on from where it is, and from where another has the body's own parameters."""
+    objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
+    first = climb(objective, *starts_from(fitted, best), iterations=TRIED_OUT, rough=True)
+    order = np.argsort(-np.nan_to_num(first.evidence, nan=-np.inf), kind="stable")
+    likely = first.take(order[apart_rows(first.coordinates[order], fitted.hypothesis.spread, GO_ON)])
+    more = LONGER * options.iterations[-1] - TRIED_OUT
+    peak = climb(objective, likely.coordinates, likely.nuisance, iterations=more)
+    better = float(peak.evidence.max()) > float(fitted.peak.evidence[0])
+    found = replace(fitted, peak=alone(peak)) if better else fitted
+    if found.traced is None or best.traced is None or not best.traced.evidence > found.traced.evidence:
+        return found
+    reached = found.traced.coordinates, best.hypothesis, best.traced.coordinates
+    # Each has a path of its own.
+    for along in np.unique([_crossed(fitted.hypothesis, *reached, all_shared=each) for each in (False, True)], axis=0):
+        other = traced(fitted.hypothesis, along[None], stages.fitted[-1], options.sensor_floor)
+        if found.traced is None or other.evidence > found.traced.evidence:
+            found = replace(found, traced=other)
+    return found
+
+
+def starts_from(fitted: Fitted, best: Fitted) -> tuple[Array, Array]:
+    """Return where a hypothesis is climbed on from: where it is, and what it is with what the best one found.
+
+    Returns:
+        Coordinates (n, K), and the windows' nuisances (n, W, NUISANCES) of the one that they are from, or at rest:
+        where a contact is met or missed by how a window begins, coordinates alone do not lead back to where they were
+        good.
+    """
+    hypothesis, own, reached = fitted.hypothesis, fitted.peak.coordinates[0], best.peak.coordinates[0]
+    begins, begun = fitted.peak.nuisance[0], best.peak.nuisance[0]
+    crossed = _crossed(hypothesis, own, best.hypothesis, reached)
+    starts = [(own, begins), (crossed, begun)]
+    if hypothesis.effects:
+        # What the best one bent of mass and delay may be the very thing that another effect explains.
+        bent = np.isin(hypothesis.columns, list(BELIEVED))
+        starts += [(hypothesis.as_believed(own), begins), (np.where(bent, own, crossed), begun)]
+    # Laws that are one another's limits share more than the body: ground friction is breakaway friction without.
+    alike = _crossed(hypothesis, own, best.hypothesis, reached, all_shared=True)
+    if np.any(alike != crossed):
+        alone_in_it = np.isin(hypothesis.columns, best.hypothesis.columns, invert=True)
+        faint = np.where(alone_in_it, hypothesis.mean - FAINT * hypothesis.spread, alike)
+        starts += [(alike, begun), (faint, begun)]
+    if fitted.traced is not None:
+        starts += [(fitted.traced.coordinates, begins)]
+    coordinates, nuisances = (np.array(each) for each in zip(*starts, strict=True))
+    return np.concatenate([coordinates] * 2), np.concatenate([nuisances, np.zeros_like(nuisances)])
+
+
+def _crossed(
+    hypothesis: Hypothesis, own: Array, other: Hypothesis, coordinates: Array, *, all_shared: bool = False
+) -> Array:
+    """Return the coordinates (K,) of a hypothesis with what is the body's, or of effects of both, as another has it.
+
+    With `all_shared` that is so of whatever both have, by its column, in whichever effect.
+    """
+    crossed = own.copy()
+    not_shared = set() if all_shared else set(hypothesis.effects) - set(other.effects)
+    effect = {column for name in not_shared for v in EFFECTS[name].variants for column in v}
+    for k, column in enumerate(hypothesis.columns):
+        if column in other.columns and column not in effect:
+            crossed[k] = coordinates[other.columns.index(column)]
+    return crossed
+
+
+def parts_led(
+    weighed: tuple[Weighed, ...], tried: list[Fitted], stages: Stages, options: DiagnoseOptions
+) -> list[Fitted]:
+    """Return what was tried, the parts of the sets that explain most climbed on from where those have them.
+
+    An effect of which there is nothing may have done no more than lead another to a better top: alone that does as well
+    there. A hold that gives way leads nothing: it is laid on a top as it is and learned beside the motion.
+    """
+    sets = [each.fitted for each in weighed if len(each.effects) > 1 and GRASP_COMPLIANCE not in each.effects]
+    sets = sorted(sets, key=_lowest)[:LEADS]
+
+    def led_on(part: Fitted) -> Fitted:
+        effects, found = set(part.hypothesis.effects), part
+        for whole in sets:
+            if effects < set(whole.hypothesis.effects) and whole.evidence > part.evidence:
+                found = _climbed_on(found, whole, stages, options)
+        return found
+
+    with ThreadPoolExecutor(options.workers) as pool:
+        return list(pool.map(led_on, tried))
