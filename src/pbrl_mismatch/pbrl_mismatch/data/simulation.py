@@ -15,13 +15,7 @@ Array = NDArray[np.float64]
 
 
 def poses(
-    rows: Array,
-    cuts: Cuts,
-    told: Array | None = None,
-    extra: Array | None = None,
-    asked: NDArray[np.bool_] | None = None,
-    *,
-    parallel: bool = False,
+    rows: Array, cuts: Cuts, told: Array | None = None, extra: Array | None = None, *, parallel: bool = False
 ) -> Array:
     """Simulate every row over every window.
 
@@ -30,7 +24,6 @@ def poses(
         cuts: W windows.
         told: (P, W, 6) start states; None: as smoothed.
         extra: (P, W, K, 3) added wrench in the body's axes, straight between K knots [N, N, N m]; None: none.
-        asked: (P, W) which windows of each row are simulated, the others' poses are NaN; None: all.
         parallel: on all cores; otherwise on this one, and other threads may simulate beside it. The bytes are the same.
 
     Returns:
@@ -46,12 +39,8 @@ def poses(
     if starts.shape != (count, windows, 6):
         raise MismatchError(f"simulation: expected starts of shape {(count, windows, 6)}, got {starts.shape}")
     added = np.zeros((1, 1, 1, 3)) if extra is None else extra
-    chosen = np.ones((count, windows), dtype=np.bool_) if asked is None else asked
-    if chosen.shape != (count, windows):
-        raise MismatchError(f"simulation: expected asked of shape {(count, windows)}, got {chosen.shape}")
     track = cuts.track
     out = np.empty((count, *cuts.place.shape, 3))
-    out[~chosen] = np.nan
     arguments = (
         plain(rows),
         plain(starts),
@@ -66,7 +55,6 @@ def poses(
         track.outline,
         track.feet,
         cuts.place,
-        np.ascontiguousarray(chosen),
         out,
     )
     if parallel:

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_mismatch.search.objective import Linear, Objective, Reduced, nuisance_step, reduce
-from pbrl_mismatch.search.quiet import Holding, of_little
+from pbrl_mismatch.search.objective import Objective, Reduced, nuisance_step, reduce
 
 Array = NDArray[np.float64]
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-6, 1e8
 EASIER, HARDER = 0.3, 6.0
-TRIALS = 4
+TRIALS = 3
 ROUNDS, SHORTER = 4, 0.3
 """Steps of the nuisances alone at most; how much shorter a window's next one is where one was too long."""
 FRESH = 2
@@ -120,35 +119,28 @@ def climb(
     gained, idle = np.full(len(u), math.inf), np.zeros(len(u), dtype=np.int64)
     most = 3.0 * objective.hypothesis.spread
     stale = 0 if spread is None else 1
-    slopes, known = spread, None
-    # Which points have left where they were linearised, and which have slopes in the nuisances of a point nearby.
-    moved, borrowed = np.ones(len(u), dtype=np.bool_), np.zeros(len(u), dtype=np.bool_)
-    holding = Holding(len(u), prior_precision)
+    slopes = None if spread is None else spread.copy()
     for iteration in range(iterations):
         on = np.flatnonzero(idle < PATIENCE)
         if len(on) == 0:
             break
         # How the start and a steady wrench move the poses hardly depends on what acts besides.
         fresh = (iteration + stale) % FRESH == 0
-        if len(again := on[moved[on] | (borrowed[on] & fresh)]):
-            linear = objective.linearise(u[again], z[again], None if fresh or slopes is None else slopes[again])
-            z[again], residual, _ = settled(objective, u[again], z[again], linear.spread, linear.residual)
-            known = _kept(known, again, replace(linear, residual=residual))
-            slopes, moved[again], borrowed[again] = known.spread, False, not fresh
-        assert known is not None and slopes is not None
-        linear = known.take(on)
+        linear = objective.linearise(u[on], z[on], None if fresh or slopes is None else slopes[on])
+        slopes = _kept(slopes, on, linear.spread)
+        z[on], residual, _ = settled(objective, u[on], z[on], linear.spread, linear.residual)
+        linear = replace(linear, residual=residual)
         reduced = reduce(linear, z[on])
         misfit = objective.misfit(linear.residual, z[on])
         cost = _cost(objective, u[on], misfit)
         gained[on] = 0.0
         open_rows = np.arange(len(on))
         matrix, vector = reduced.weighed(objective.weights(misfit))
-        curvature, quiet = matrix + np.diag(prior_precision), of_little(matrix, prior_precision)
+        curvature = matrix + np.diag(prior_precision)
         pull = vector - (u[on] - objective.hypothesis.mean) * prior_precision
         for _ in range(TRIALS):
             now = on[open_rows]
             damped = curvature[open_rows] + damping[now, None, None] * _diagonal(curvature[open_rows])
-            damped += holding.added(now, quiet[open_rows])
             step = np.linalg.solve(damped, pull[open_rows, :, None])[..., 0]
             step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
             step = objective.hypothesis.believable(u[now] + step) - u[now]
@@ -158,26 +150,19 @@ def climb(
             trial = _cost(objective, trial_u, misfit)
             better = trial < cost[open_rows]
             rows = now[better]
-            moved[rows] = True
             u[rows], z[rows] = trial_u[better], trial_z[better]
             gained[rows] = 0.5 * (cost[open_rows[better]] - trial[better])
             damping[rows] = np.maximum(damping[rows] * EASIER, LEAST_DAMPING)
-            holding.stepped(rows, gained[rows])
-            open_rows, now = open_rows[~better], now[~better]
-            # First without what is quiet, and only then a shorter step.
-            shorter = holding.failed(now, quiet[open_rows])
-            damping[shorter] = np.minimum(damping[shorter] * HARDER, MOST_DAMPING)
+            open_rows = open_rows[~better]
+            damping[on[open_rows]] = np.minimum(damping[on[open_rows]] * HARDER, MOST_DAMPING)
             if len(open_rows) == 0:
                 break
         idle[on] = np.where(gained[on] < SETTLED, idle[on] + 1, 0)
         if np.all(gained < SETTLED):
             break
-    if len(again := np.flatnonzero(moved) if rough else np.arange(len(u))):
-        last = objective.linearise(u[again], z[again], slopes[again] if rough and slopes is not None else None)
-        known = _kept(known, again, last)
-    assert known is not None
-    reduced = reduce(known, z)
-    misfit = objective.misfit(known.residual, z)
+    linear = objective.linearise(u, z, slopes if rough else None)
+    reduced = reduce(linear, z)
+    misfit = objective.misfit(linear.residual, z)
     evidence = log_evidence(objective, u, misfit, reduced)
     return Peak(objective, u, z, misfit, objective.weights(misfit), reduced, evidence, gained < 1.0)
 
@@ -195,13 +180,8 @@ def settled(
     z, here = nuisance, objective.misfit(residual, nuisance)
     share = np.ones(here.shape)
     for _ in range(ROUNDS):
-        step, promised = nuisance_step(spread, residual, z)
-        # A window that has next to nothing to gain is not simulated again; all of them together are next to nothing.
-        asked = share * (2.0 - share) * promised > SETTLED / here.shape[1]
-        if not asked.any():
-            break
-        trial = np.where(asked[..., None], z + share[..., None] * step, z)
-        found = objective.residual(coordinates, trial, (residual, asked))
+        trial = z + share[..., None] * nuisance_step(spread, residual, z)
+        found = objective.residual(coordinates, trial)
         there = objective.misfit(found, trial)
         better = there < here
         z, residual = np.where(better[..., None], trial, z), np.where(better[..., None], found, residual)
@@ -213,11 +193,11 @@ def settled(
     return z, residual, here
 
 
-def _kept(known: Linear | None, rows: NDArray[np.int64], found: Linear) -> Linear:
-    """Return what is known of all points with some rows as they were found; at first all are."""
+def _kept(known: Array | None, rows: NDArray[np.int64], found: Array) -> Array:
+    """Return what is known of all starts with some rows as they were found; at first all are."""
     if known is None:
         return found
-    known.residual[rows], known.slope[rows], known.spread[rows] = found.residual, found.slope, found.spread
+    known[rows] = found
     return known
 
 

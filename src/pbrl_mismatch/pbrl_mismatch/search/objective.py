@@ -23,7 +23,6 @@ from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 START, WRENCH = 6, 3
 NUISANCES = START + WRENCH
@@ -46,10 +45,6 @@ class Linear:
     residual: Array
     slope: Array
     spread: Array
-
-    def take(self, rows: NDArray[np.int64]) -> Linear:
-        """Return some of the points."""
-        return Linear(self.residual[rows], self.slope[rows], self.spread[rows])
 
 
 @dataclass(frozen=True)
@@ -77,12 +72,12 @@ class Objective:
         """Return nuisances (count, W, NUISANCES) of zero."""
         return np.zeros((count, len(self.cuts), NUISANCES))
 
-    def _simulated(self, rows: Array, nuisance: Array, asked: Mask | None = None) -> Array:
-        """Return (P, W, N, 3) simulated poses, NaN where they are not asked."""
+    def _simulated(self, rows: Array, nuisance: Array) -> Array:
+        """Return (P, W, N, 3) simulated poses."""
         track = self.cuts.track
         told = self.cuts.told + np.einsum("wkl,pwl->pwk", self.cuts.root, nuisance[..., :START])
         scale = self.floor * np.array([1.0, 1.0, track.gyration])
-        return poses(rows, self.cuts, told, (nuisance[..., START:] * scale)[:, :, None, :], asked)
+        return poses(rows, self.cuts, told, (nuisance[..., START:] * scale)[:, :, None, :])
 
     def _residual(self, found: Array) -> Array:
         difference = self.cuts.pose - found
@@ -91,19 +86,14 @@ class Objective:
             bounded = np.nan_to_num(difference * self.cuts.weight, nan=1e6, posinf=1e6, neginf=-1e6)
         return np.clip(bounded, -1e6, 1e6).reshape(len(found), len(self.cuts), -1)
 
-    def residual(self, coordinates: Array, nuisance: Array, known: tuple[Array, Mask] | None = None) -> Array:
+    def residual(self, coordinates: Array, nuisance: Array) -> Array:
         """Return (P, W, R) residuals over noise, zero where nothing was seen.
 
         Args:
             coordinates: (P, K).
             nuisance: (P, W, NUISANCES).
-            known: residuals of windows in which nothing has changed, and which (P, W) are to be simulated; None: all.
         """
-        if known is None:
-            return self._residual(self._simulated(self.hypothesis.rows(coordinates), nuisance))
-        before, asked = known
-        found = self._residual(self._simulated(self.hypothesis.rows(coordinates), nuisance, asked))
-        return np.where(asked[..., None], found, before)
+        return self._residual(self._simulated(self.hypothesis.rows(coordinates), nuisance))
 
     @property
     def counts(self) -> Array:
@@ -187,16 +177,12 @@ class Reduced:
         return np.einsum("pw,pwkl->pkl", weight, self.matrix), np.einsum("pw,pwk->pk", weight, self.vector)
 
 
-def nuisance_step(spread: Array, residual: Array, nuisance: Array) -> tuple[Array, Array]:
-    """Return the step to the best nuisances for slopes (P, W, R, NUISANCES), coordinates kept.
-
-    Returns:
-        The step (P, W, NUISANCES), and by how much it lowers each window's misfit (P, W), were slopes what they say.
-    """
+def nuisance_step(spread: Array, residual: Array, nuisance: Array) -> Array:
+    """Return the step (P, W, NUISANCES) to the best nuisances for slopes (P, W, R, NUISANCES), coordinates kept."""
     spread_t = np.swapaxes(spread, -1, -2)
     pull = (spread_t @ residual[..., None])[..., 0] - nuisance
     step = np.linalg.solve(spread_t @ spread + np.eye(NUISANCES), pull[..., None])[..., 0]
-    return np.asarray(step, dtype=np.float64), np.sum(step * pull, axis=-1)
+    return np.asarray(step, dtype=np.float64)
 
 
 def reduce(linear: Linear, nuisance: Array) -> Reduced:
