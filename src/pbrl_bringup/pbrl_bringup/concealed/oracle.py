@@ -28,16 +28,20 @@ from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climbed_on import led
 from pbrl_mismatch.search.fitted import Fitted, Stages, cut_stages, fit_from, judged, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way, grip_evidence
+from pbrl_mismatch.search.hops import hopped
 from pbrl_mismatch.search.hypothesis import BaselineOptions, Hypothesis, baselines
 from pbrl_mismatch.search.library import trace
 from pbrl_mismatch.search.told_baseline import ToldBaseline
 
 Array = NDArray[np.float64]
 
-STARTS = 6
+STARTS, PLAIN = 8, 3
+"""Starts of a fit that is told, and how many of them are not beside the truth but at it."""
 JITTER = 0.15, 0.003
-"""Of the first and of the last start beside the truth, in standard deviations of the prior: a contact is met or missed
-by a centimetre where a post may be anywhere in a metre or two."""
+"""Of the farthest and of the nearest start beside the truth, in standard deviations of the prior: a contact is met or
+missed by a centimetre where a post may be anywhere in a metre or two."""
+THOROUGH = {"candidates": STARTS, "keep": (STARTS, 4), "iterations": (12, 24)}
+"""Settings of a fit that is told: what it does not find, what was drawn is thought not to be seen at all."""
 HOPELESS = 0.7
 """Times the detectable strength below which a first glance says no; it lacks some starts of a look."""
 
@@ -159,7 +163,7 @@ def seen(laid: Laid, truth: Truth) -> Oracle | None:
 
     Of several effects each has to be, beside an oracle that is told the others: what cannot be seen cannot be named.
 
-    Most draws that are too weak are so by far. They are told by one climb from the truth with the effects and one
+    Most draws that are too weak are so by far. They are told by a climb from the truth with the effects and one
     without: what keeps the baseline from better optima makes the effects look stronger, never weaker.
     """
     if _glance(laid, truth).times_detectable < HOPELESS:
@@ -206,7 +210,7 @@ def _glance(laid: Laid, truth: Truth) -> Oracle:
         base = _fitted(laid.baseline.hypothesis, {}, None, last, 1)
     else:
         base = _fitted(kind_of_baseline(laid.track, laid.options, _kind(truth)), truth.told, None, last, 1)
-    return Oracle(_told(last, truth, base, 1), beside_motion(base, laid.grip))
+    return Oracle(_told(last, truth, base, PLAIN), beside_motion(base, laid.grip))
 
 
 def _kind(truth: Truth) -> str:
@@ -235,13 +239,15 @@ def _told(laid: Laid, truth: Truth, base: Fitted, starts: int) -> Fitted:
 
 
 def _fitted(hypothesis: Hypothesis, values: Mapping[str, float], base: Fitted | None, laid: Laid, count: int) -> Fitted:
-    """Climb from the truth and from beside it, see `starts_told`; more than once, along the path as well."""
+    """Climb from the truth, and with all starts from beside it, see `starts_told`, and along the path as well."""
     starts = starts_told(hypothesis, values, base, count, np.random.default_rng(laid.options.seed))
-    found = fit_from(hypothesis, laid.stages, starts, laid.options)
-    if count == 1:
-        return found
+    if count < STARTS:
+        return fit_from(hypothesis, laid.stages, starts, laid.options)
+    found = fit_from(hypothesis, laid.stages, starts, laid.options.model_copy(update=THOROUGH))
+    found = hopped(found, laid.stages.fitted[-1], laid.options)
     # Each has a path of its own.
-    along = [trace(laid.longest, laid.options, found, each[None]) for each in (found.peak.coordinates[0], *starts[:2])]
+    begun = (found.peak.coordinates[0], *starts[:PLAIN])
+    along = [trace(laid.longest, laid.options, found, each[None]) for each in begun]
     return max(along, key=_evidence)
 
 
@@ -251,7 +257,8 @@ def starts_told(
     """Return starts (count, K): the truth, where the baseline has the body's own parameters, and beside the truth.
 
     What is not told starts where the baseline is, or at its prior. Without one of its effects a body's best is seldom
-    at the truth: one wheel between two does what both do.
+    at the truth: one wheel between two does what both do, and a body that a patch holds is four times as heavy. Every
+    second start has what bends so as it was believed to be.
 
     Args:
         hypothesis: that is to be fitted.
@@ -261,17 +268,18 @@ def starts_told(
         rng: source of randomness.
     """
     centre, own = hypothesis.mean.copy(), {}
+    told = np.isin(hypothesis.columns, list(values))
     for k, parameter in enumerate(hypothesis.parameters):
-        told = values.get(parameter.column)
-        if told is not None:
-            centre[k] = math.log(max(told, 1e-6)) if parameter.positive else told
+        if told[k]:
+            value = values[parameter.column]
+            centre[k] = math.log(max(value, 1e-6)) if parameter.positive else value
         if base is not None and parameter.column in base.hypothesis.columns:
             own[k] = base.peak.coordinates[0, base.hypothesis.columns.index(parameter.column)]
-            centre[k] = own[k] if told is None else centre[k]
-    beside = np.geomspace(*JITTER, count)[:, None] * hypothesis.spread
-    starts = centre + beside * rng.standard_normal((count, len(centre)))
-    starts[0] = centre
+            centre[k] = centre[k] if told[k] else own[k]
+    beside = np.zeros(count)
+    beside[PLAIN:] = np.geomspace(*JITTER, max(count - PLAIN, 0))
+    starts = np.tile(centre, (count, 1))
     if own and count > 1:
-        starts[1] = centre
         starts[1, list(own)] = list(own.values())
-    return starts
+    starts[2::2] = np.where(told, centre, hypothesis.as_believed(centre))
+    return starts + beside[:, None] * hypothesis.spread * rng.standard_normal(starts.shape)

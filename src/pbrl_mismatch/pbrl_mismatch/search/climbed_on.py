@@ -14,6 +14,7 @@ from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart_rows
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
+from pbrl_mismatch.search.hops import hopped
 from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.ground import traced
@@ -60,7 +61,13 @@ def _lowest(fitted: Fitted) -> float:
 
 
 def polished(
-    weighed: tuple[Weighed, ...], tried: list[Fitted], stages: Stages, options: DiagnoseOptions, most: int = POLISHED
+    weighed: tuple[Weighed, ...],
+    tried: list[Fitted],
+    stages: Stages,
+    options: DiagnoseOptions,
+    most: int = POLISHED,
+    *,
+    hops: bool = True,
 ) -> list[Fitted]:
     """Return what was tried, the likeliest climbed on, also from what the best one has for the baseline's parameters.
 
@@ -75,10 +82,13 @@ def polished(
     names = [each.effects for each in weighed if each.effects][: most if best.evidence > none + EXPLAINS else None]
     chosen = {id(each.fitted) for each in weighed if each.effects in names}
     jobs = [each for each in tried if id(each) in chosen and GRASP_COMPLIANCE not in each.hypothesis.effects]
+
+    def on(fitted: Fitted) -> Fitted:
+        found = _climbed_on(fitted, best, stages, options)
+        return hopped(found, stages.fitted[-1], options) if hops else found
+
     with ThreadPoolExecutor(options.workers) as pool:
-        better = dict(
-            zip(map(id, jobs), pool.map(lambda each: _climbed_on(each, best, stages, options), jobs), strict=True)
-        )
+        better = dict(zip(map(id, jobs), pool.map(on, jobs), strict=True))
     return [better.get(id(each), each) for each in tried]
 
 

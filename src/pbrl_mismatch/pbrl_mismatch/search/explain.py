@@ -16,6 +16,7 @@ from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climbed_on import LED, POLISHED_OF_SETS, led, parts_led, polished
 from pbrl_mismatch.search.fitted import Fitted, Stages, judged
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
+from pbrl_mismatch.search.hops import REACHED, hopped
 from pbrl_mismatch.search.library import search_library, trace
 from pbrl_mismatch.search.path.pins import may_be_pinned
 from pbrl_mismatch.search.predictive import predictive_test
@@ -28,8 +29,6 @@ GROUNDS_OF_SETS, OF_THE_BEST = 3, 0.3
 that act, the likeliest is often a third that stands in for both. Each explains at least this share of what it does."""
 FEWER = {"shortlist": 6, "candidates": 2, "keep": (1, 1)}
 """What is looked at where an effect is laid on another: the ground is nearly right."""
-REACHED = 1.12
-"""A hypothesis that needs less than this scale of the noise predicts windows of its length."""
 WORTH_A_SET = 3.0
 """Where the likeliest explains all that the test against any wrench sees, one effect more is looked into where along
 the path it is worth by this more than its prior costs [nat]."""
@@ -83,13 +82,16 @@ def explain(
     bases = led(bases, tried, stages, options)
     singles = weigh(bases, tried, options)
     if _falls_short(tried) and len(stages.fitted) > 1:
-        tried = polished(singles, tried, stages, options)
+        tried = polished(singles, tried, stages, options, hops=False)
     if _falls_short(tried) and len(stages.fitted) > 1:
         stages, bases = stages.without_longest(), [each.over_shorter() for each in bases]
         bases = sorted(bases, key=lambda each: -each.evidence)
         tried = [beside_motion(each.over_shorter(), grip) for each in tried]
         bases = led(bases, tried, stages, options)
     tried = [beside_motion(each, grip) for each in polished(weigh(bases, tried, options), tried, stages, options)]
+    # What has hopped is held against what has hopped as well.
+    best = hopped(bases[0], stages.fitted[-1], options)
+    bases = sorted([beside_motion(best, grip), *bases[1:]], key=lambda each: -each.evidence)
     weighed = weigh(bases, tried, options)
     odds = min(_log_odds(singles), _log_odds(weighed))
     for depth in range(1, options.most_together):
