@@ -32,7 +32,7 @@ def ends(concealed_recording: Callable[..., Recording]) -> Any:
     objective = Objective(patch, cuts, OPTIONS.sensor_floor)
     beside = patch.mean + 0.3 * patch.spread * rng.standard_normal((2, len(patch.mean)))
     climbed = [Fitted(patch, alone(climb(objective, each[None], iterations=8)), None) for each in beside]
-    return climbed, cuts, [hopped(each, cuts, OPTIONS) for each in climbed]
+    return climbed, cuts, [hopped([each], cuts, OPTIONS)[0] for each in climbed]
 
 
 def test_hops_from_where_climbs_end_apart_end_together(ends: Any) -> None:
@@ -42,9 +42,9 @@ def test_hops_from_where_climbs_end_apart_end_together(ends: Any) -> None:
     assert abs(np.diff([each.evidence for each in after])) < 0.1 * abs(np.diff([each.evidence for each in before]))
 
 
-def test_the_same_seed_hops_the_same_way(ends: Any) -> None:
+def test_the_same_seed_hops_the_same_way_on_any_number_of_workers(ends: Any) -> None:
     (first, _), cuts, (after, _) = ends
-    again = hopped(first, cuts, OPTIONS)
+    (again,) = hopped([first], cuts, OPTIONS.model_copy(update={"workers": 2}))
     assert again.peak.coordinates.tobytes() == after.peak.coordinates.tobytes()
     assert again.evidence == after.evidence >= first.evidence
 
@@ -53,4 +53,10 @@ def test_what_predicts_its_windows_is_left_as_it_is(ends: Any) -> None:
     (first, _), cuts, _ = ends
     explained = replace(first, peak=replace(first.peak, misfit=np.zeros_like(first.peak.misfit)))
     assert explained.noise_scale == 1.0
-    assert hopped(explained, cuts, OPTIONS) is explained
+    assert hopped([explained], cuts, OPTIONS)[0] is explained
+
+
+def test_what_is_too_far_behind_hops_no_more(ends: Any) -> None:
+    (first, _), cuts, (after, _) = ends
+    (behind,) = hopped([first], cuts, OPTIONS, ahead=1e6)
+    assert first.evidence < behind.evidence < after.evidence

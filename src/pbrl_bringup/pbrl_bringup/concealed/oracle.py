@@ -244,7 +244,7 @@ def _fitted(hypothesis: Hypothesis, values: Mapping[str, float], base: Fitted | 
     if count < STARTS:
         return fit_from(hypothesis, laid.stages, starts, laid.options)
     found = fit_from(hypothesis, laid.stages, starts, laid.options.model_copy(update=THOROUGH))
-    found = hopped(found, laid.stages.fitted[-1], laid.options)
+    (found,) = hopped([found], laid.stages.fitted[-1], laid.options)
     # Each has a path of its own.
     begun = (found.peak.coordinates[0], *starts[:PLAIN])
     along = [trace(laid.longest, laid.options, found, each[None]) for each in begun]

@@ -82,13 +82,10 @@ def polished(
     names = [each.effects for each in weighed if each.effects][: most if best.evidence > none + EXPLAINS else None]
     chosen = {id(each.fitted) for each in weighed if each.effects in names}
     jobs = [each for each in tried if id(each) in chosen and GRASP_COMPLIANCE not in each.hypothesis.effects]
-
-    def on(fitted: Fitted) -> Fitted:
-        found = _climbed_on(fitted, best, stages, options)
-        return hopped(found, stages.fitted[-1], options) if hops else found
-
     with ThreadPoolExecutor(options.workers) as pool:
-        better = dict(zip(map(id, jobs), pool.map(on, jobs), strict=True))
+        found = list(pool.map(lambda each: _climbed_on(each, best, stages, options), jobs))
+    found = hopped(found, stages.fitted[-1], options) if hops else found
+    better = dict(zip(map(id, jobs), found, strict=True))
     return [better.get(id(each), each) for each in tried]
 
 

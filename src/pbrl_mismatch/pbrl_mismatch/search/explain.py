@@ -90,7 +90,7 @@ def explain(
         bases = led(bases, tried, stages, options)
     tried = [beside_motion(each, grip) for each in polished(weigh(bases, tried, options), tried, stages, options)]
     # What has hopped is held against what has hopped as well.
-    best = hopped(bases[0], stages.fitted[-1], options)
+    (best,) = hopped(bases[:1], stages.fitted[-1], options, max(each.evidence for each in tried))
     bases = sorted([beside_motion(best, grip), *bases[1:]], key=lambda each: -each.evidence)
     weighed = weigh(bases, tried, options)
     odds = min(_log_odds(singles), _log_odds(weighed))
