@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_mismatch.search.objective import Objective, Reduced, nuisance_step, reduce
+from pbrl_mismatch.search.quiet import Holding, of_little
 
 Array = NDArray[np.float64]
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-6, 1e8
 EASIER, HARDER = 0.3, 6.0
-TRIALS = 3
+TRIALS = 4
 ROUNDS, SHORTER = 4, 0.3
 """Steps of the nuisances alone at most; how much shorter a window's next one is where one was too long."""
 FRESH = 2
@@ -120,6 +121,7 @@ def climb(
     most = 3.0 * objective.hypothesis.spread
     stale = 0 if spread is None else 1
     slopes = None if spread is None else spread.copy()
+    holding = Holding(len(u), prior_precision)
     for iteration in range(iterations):
         on = np.flatnonzero(idle < PATIENCE)
         if len(on) == 0:
@@ -136,11 +138,12 @@ def climb(
         gained[on] = 0.0
         open_rows = np.arange(len(on))
         matrix, vector = reduced.weighed(objective.weights(misfit))
-        curvature = matrix + np.diag(prior_precision)
+        curvature, quiet = matrix + np.diag(prior_precision), of_little(matrix, prior_precision)
         pull = vector - (u[on] - objective.hypothesis.mean) * prior_precision
         for _ in range(TRIALS):
             now = on[open_rows]
             damped = curvature[open_rows] + damping[now, None, None] * _diagonal(curvature[open_rows])
+            damped += holding.added(now, quiet[open_rows])
             step = np.linalg.solve(damped, pull[open_rows, :, None])[..., 0]
             step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
             step = objective.hypothesis.believable(u[now] + step) - u[now]
@@ -153,8 +156,11 @@ def climb(
             u[rows], z[rows] = trial_u[better], trial_z[better]
             gained[rows] = 0.5 * (cost[open_rows[better]] - trial[better])
             damping[rows] = np.maximum(damping[rows] * EASIER, LEAST_DAMPING)
-            open_rows = open_rows[~better]
-            damping[on[open_rows]] = np.minimum(damping[on[open_rows]] * HARDER, MOST_DAMPING)
+            holding.stepped(rows, gained[rows])
+            open_rows, now = open_rows[~better], now[~better]
+            # First without what is quiet, and only then a shorter step.
+            shorter = holding.failed(now, quiet[open_rows])
+            damping[shorter] = np.minimum(damping[shorter] * HARDER, MOST_DAMPING)
             if len(open_rows) == 0:
                 break
         idle[on] = np.where(gained[on] < SETTLED, idle[on] + 1, 0)

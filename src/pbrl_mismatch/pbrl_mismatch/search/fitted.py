@@ -26,7 +26,7 @@ from pbrl_model.fitting.guesses import axle, circle, pivot
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-BASELINE_STARTS, BASELINE_STEPS, KEPT_OF_BASELINE = 20, 6, 4
+BASELINE_STARTS, BASELINE_STEPS, KEPT_OF_BASELINE = 20, 8, 4
 """A baseline is climbed along the path from so many starts, in so many steps; so many go on to windows."""
 WHOLE = 4
 """Steps from the best of the kept windows to that of all."""

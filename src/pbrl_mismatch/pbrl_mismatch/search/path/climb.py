@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
 from pbrl_mismatch.search.path.along import Along
+from pbrl_mismatch.search.quiet import Holding, of_little
 
 Array = NDArray[np.float64]
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-6, 1e6
 EASIER, HARDER = 0.2, 8.0
-SETTLED = 0.05
-"""A gain below this [nat] of all starts ends a climb."""
+SETTLED, STEEP = 0.05, 1e3
+"""A gain below this [nat] of all starts ends a climb, where each has been damped by more than that."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,8 @@ def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations:
     """
     u, count, free = hypothesis.believable(starts), len(starts), starts.shape[1]
     steps, spread, mean = step_sizes(hypothesis), hypothesis.spread, hypothesis.mean
-    damping, most = np.full(count, FIRST_DAMPING), 3.0 * spread
+    damping, most, holding = np.full(count, FIRST_DAMPING), 3.0 * spread, Holding(count, spread**-2.0)
+    every = np.arange(count)
     moves = np.concatenate([np.zeros((1, free)), np.diag(steps)])
 
     def prior(points: Array) -> Array:
@@ -102,7 +104,9 @@ def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations:
         curvature = matrix + np.diag(spread**-2.0)
         pull = vector - (u - mean) / spread**2
         diagonal = curvature * np.eye(free)
-        step = np.linalg.solve(curvature + damping[:, None, None] * diagonal, pull[..., None])[..., 0]
+        quiet = of_little(matrix, spread**-2.0)
+        damped = curvature + damping[:, None, None] * diagonal + holding.added(every, quiet)
+        step = np.linalg.solve(damped, pull[..., None])[..., 0]
         step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
         step = hypothesis.believable(u + step) - u
         there_residual, there_slope = linear(u + step)
@@ -113,8 +117,12 @@ def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations:
         misfit = np.where(better[:, None], there, misfit)
         residual = np.where(better[:, None, None], there_residual, residual)
         slope = np.where(better[:, None, None, None], there_slope, slope)
-        damping = np.clip(damping * np.where(better, EASIER, HARDER), LEAST_DAMPING, MOST_DAMPING)
-        if float(np.max(np.where(better, gained, 0.0))) < SETTLED and float(damping.min()) > 1.0:
+        # First without what is quiet, and only then a shorter step.
+        shorter = holding.failed(every[~better], quiet[~better])
+        holding.stepped(every[better], gained[better])
+        damping[better], damping[shorter] = damping[better] * EASIER, damping[shorter] * HARDER
+        damping = np.clip(damping, LEAST_DAMPING, MOST_DAMPING)
+        if float(np.max(np.where(better, gained, 0.0))) < SETTLED and float(damping.min()) > STEEP:
             break
     matrix, _ = normal(residual, slope, weights(along, misfit))
     _, log_det = np.linalg.slogdet(matrix * np.outer(spread, spread) + np.eye(free))

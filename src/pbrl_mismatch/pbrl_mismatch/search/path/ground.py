@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 COARSE, FINE = 8, 4
 """Steps between accelerations: for a first look, and for a climb or where more moves than the body."""
-ITERATIONS = 5
+ITERATIONS = 8
 
 
 @dataclass(frozen=True)

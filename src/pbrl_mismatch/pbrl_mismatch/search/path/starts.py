@@ -32,7 +32,7 @@ FOUND = frozenset({"wheel_x", "wheel_y", "wheel_theta", "hinge_x", "hinge_y", "h
 PARENTS, NEARBY = 3, (0.15, 0.04)
 """Of the draws of each half so many are drawn about again; how far, in standard deviations of the prior: a second time
 what is met, or missed by a centimetre."""
-BEGUN, CLIMBED = 3, 5
+BEGUN, CLIMBED = 3, 8
 """Steps along the path of all starts of a hypothesis, and of the best of them."""
 
 
