@@ -92,6 +92,8 @@ def test_an_interrupted_parent_leaves_none(tmp_path: Path) -> None:
         import signal
         from pathlib import Path
         from pbrl_bringup.processes import Programs
+        # Tests that a shell runs in the background are started with interrupts ignored.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         with Programs(Path({str(tmp_path)!r})) as programs:
             print(programs.start("child", {python(PATIENT)!r}).process.pid, flush=True)
             signal.pause()

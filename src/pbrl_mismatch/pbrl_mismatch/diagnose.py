@@ -24,7 +24,16 @@ from pbrl_mismatch.observability.detectable import could_not_show
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.report import Finding, findings_of, held_out_report, sentence
 from pbrl_mismatch.search.explain import explain, held_against
-from pbrl_mismatch.search.fitted import Fitted, Stages, cut_stages, fit_baseline, hinge_guess, judged, scene_of
+from pbrl_mismatch.search.fitted import (
+    Fitted,
+    Stages,
+    cut_stages,
+    fit_baseline,
+    hinge_guess,
+    judged,
+    likeliest_first,
+    scene_of,
+)
 from pbrl_mismatch.search.grip import beside_motion, grip_evidence
 from pbrl_mismatch.search.heldout import noise_floor
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
@@ -205,8 +214,7 @@ def fit_baselines(
     if "hinge" in options.baseline and hinge is None:
         raise MismatchError(f"{track.object}: expected a motion that is not along a line for a hinge, got one that is")
     kinds = baselines(believed, options.baseline, 0.5 * (lower + upper), 0.5 * (upper - lower), hinge)
-    fitted = [fit_baseline(rng, track, kind, stages, options) for kind in kinds]
-    return sorted(fitted, key=lambda each: -each.evidence)
+    return likeliest_first(fit_baseline(rng, track, kind, stages, options) for kind in kinds)
 
 
 def least_of_two(one: float, other: float) -> float:

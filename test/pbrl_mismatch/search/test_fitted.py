@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from pbrl_bag.types import Recording
 from pbrl_mismatch import track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.fitted import Fitted
+from pbrl_mismatch.search.fitted import Fitted, alone, tops
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.objective import Objective
 
@@ -28,3 +30,14 @@ def test_what_is_unexplained_is_what_its_likelihood_lacks_to_that_of_noise(
     lacks = objective.likelihood(noise) - objective.likelihood(level.peak.misfit)
     assert level.unexplained == pytest.approx(float(lacks[0]), rel=1e-9)
     assert level.unexplained > 100.0
+
+
+def test_of_a_climb_a_law_that_ran_away_is_the_last(concealed_recording: Callable[..., Recording]) -> None:
+    track = track_of(concealed_recording("floor_slope", 1), "table")
+    free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.02), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    starts = free.mean + free.spread * np.array([0.0, 0.5, -0.5])[:, None]
+    peak = climb(Objective(free, cut_windows(track, 2.0), 0.15), starts, iterations=1)
+    peak = replace(peak, evidence=np.array([math.nan, -2.0, -1.0]))
+    assert peak.ranked.tolist() == [2, 1, 0]
+    assert alone(peak).evidence.tolist() == [-1.0]
+    np.testing.assert_array_equal(tops(peak, 2), peak.coordinates[[2, 1]])

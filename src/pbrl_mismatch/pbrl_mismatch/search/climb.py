@@ -61,9 +61,14 @@ class Peak:
         return np.sqrt(np.maximum(1.0, self.misfit.sum(axis=1) / self.objective.observations))
 
     @property
+    def ranked(self) -> NDArray[np.int64]:
+        """Return (P,) the rows, the highest evidence first; a law that has run away has none, and is last."""
+        return np.argsort(-self.evidence, kind="stable")
+
+    @property
     def best(self) -> int:
         """Return the row of the highest evidence."""
-        return int(np.argmax(self.evidence))
+        return int(self.ranked[0])
 
     def take(self, rows: NDArray[np.int64]) -> Peak:
         """Return some of the points."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart_rows
+from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart_rows, likeliest_first
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hops import hopped
 from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
@@ -45,7 +45,7 @@ def led(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: Diagn
 
     Where bodies stick there are many tops. An effect that does nothing but lead to a better one explains nothing.
     """
-    likely = sorted((each for each in tried if GRASP_COMPLIANCE not in each.hypothesis.effects), key=_lowest)[:LEADS]
+    likely = likeliest_first(each for each in tried if GRASP_COMPLIANCE not in each.hypothesis.effects)[:LEADS]
     best, climbed = max(base.evidence for base in bases), []
     for base in bases:
         found = base
@@ -53,11 +53,7 @@ def led(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: Diagn
             # One that is no likelier for all its freedom has found no better top.
             found = _climbed_on(found, each, stages, options) if each.evidence > found.evidence - FREEDOM else found
         climbed.append(found)
-    return sorted(climbed, key=_lowest)
-
-
-def _lowest(fitted: Fitted) -> float:
-    return -fitted.evidence
+    return likeliest_first(climbed)
 
 
 def polished(
@@ -93,11 +89,11 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
     """Return a hypothesis climbed on from where it is, and from where another has the body's own parameters."""
     objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
     first = climb(objective, *starts_from(fitted, best), iterations=TRIED_OUT, rough=True)
-    order = np.argsort(-np.nan_to_num(first.evidence, nan=-np.inf), kind="stable")
+    order = first.ranked
     likely = first.take(order[apart_rows(first.coordinates[order], fitted.hypothesis.spread, GO_ON)])
     more = LONGER * options.iterations[-1] - TRIED_OUT
     peak = climb(objective, likely.coordinates, likely.nuisance, iterations=more)
-    better = float(peak.evidence.max()) > float(fitted.peak.evidence[0])
+    better = peak.evidence[peak.best] > fitted.peak.evidence[0]
     found = replace(fitted, peak=alone(peak)) if better else fitted
     if found.traced is None or best.traced is None or not best.traced.evidence > found.traced.evidence:
         return found
@@ -163,7 +159,7 @@ def parts_led(
     there. A hold that gives way leads nothing: it is laid on a top as it is and learned beside the motion.
     """
     sets = [each.fitted for each in weighed if len(each.effects) > 1 and GRASP_COMPLIANCE not in each.effects]
-    sets = sorted(sets, key=_lowest)[:LEADS]
+    sets = likeliest_first(sets)[:LEADS]
 
     def led_on(part: Fitted) -> Fitted:
         effects, found = set(part.hypothesis.effects), part

@@ -14,7 +14,7 @@ from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climbed_on import LED, POLISHED_OF_SETS, led, parts_led, polished
-from pbrl_mismatch.search.fitted import Fitted, Stages, judged
+from pbrl_mismatch.search.fitted import Fitted, Stages, judged, likeliest_first
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
 from pbrl_mismatch.search.hops import REACHED, hopped
 from pbrl_mismatch.search.library import search_library, trace
@@ -77,7 +77,7 @@ def explain(
     seeds = seed.spawn(options.most_together)
     longest = cut_windows(track, max(options.windows))
     bases = [trace(longest, options, each, each.peak.coordinates) for each in bases]
-    bases = sorted(bases, key=lambda each: -each.evidence)
+    bases = likeliest_first(bases)
     tried = _tried(seeds[0], track, _grounds(bases), stages, grip, options)
     bases = led(bases, tried, stages, options)
     singles = weigh(bases, tried, options)
@@ -85,13 +85,13 @@ def explain(
         tried = polished(singles, tried, stages, options, hops=False)
     if _falls_short(tried) and len(stages.fitted) > 1:
         stages, bases = stages.without_longest(), [each.over_shorter() for each in bases]
-        bases = sorted(bases, key=lambda each: -each.evidence)
+        bases = likeliest_first(bases)
         tried = [beside_motion(each.over_shorter(), grip) for each in tried]
         bases = led(bases, tried, stages, options)
     tried = [beside_motion(each, grip) for each in polished(weigh(bases, tried, options), tried, stages, options)]
     # What has hopped is held against what has hopped as well.
     (best,) = hopped(bases[:1], stages.fitted[-1], options, max(each.evidence for each in tried))
-    bases = sorted([beside_motion(best, grip), *bases[1:]], key=lambda each: -each.evidence)
+    bases = likeliest_first([beside_motion(best, grip), *bases[1:]])
     weighed = weigh(bases, tried, options)
     odds = min(_log_odds(singles), _log_odds(weighed))
     for depth in range(1, options.most_together):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -200,13 +201,17 @@ def fit_from(hypothesis: Hypothesis, stages: Stages, starts: Array, options: Dia
         rough = stage + 2 < len(stages.fitted)
         shorter = peak
         peak = climb(Objective(hypothesis, cuts, options.sensor_floor), u, iterations=iterations, rough=rough)
-        order = np.argsort(-peak.evidence, kind="stable")
-        short = peak.coordinates[order[0]] if short is None else short
+        short = peak.coordinates[peak.best] if short is None else short
         if stage + 1 < len(stages.fitted):
-            u = apart(peak.coordinates[order], hypothesis.spread, options.keep[stage + 1])
+            u = tops(peak, options.keep[stage + 1])
     if peak is None:
         raise MismatchError("search: expected at least one length of window, got none")
     return Fitted(hypothesis, alone(peak), None, short, None if shorter is None else alone(shorter))
+
+
+def tops(peak: Peak, count: int) -> Array:
+    """Return the coordinates (n, K) of so many of the likeliest points of a climb that are apart, best first."""
+    return apart(peak.coordinates[peak.ranked], peak.objective.hypothesis.spread, count)
 
 
 def apart(coordinates: Array, spread: Array, count: int) -> Array:
@@ -283,6 +288,11 @@ def hinge_guess(track: Track) -> dict[str, float] | None:
     return {"hinge_x": float(centre[0]), "hinge_y": float(centre[1]), "hinge_radius": radius}
 
 
+def likeliest_first(fits: Iterable[Fitted]) -> list[Fitted]:
+    """Return hypotheses, the highest evidence first; what is equal stays in its order."""
+    return sorted(fits, key=lambda each: -each.evidence)
+
+
 def alone(peak: Peak) -> Peak:
     """Return the best of its points."""
     return peak.take(np.array([peak.best]))
@@ -322,7 +332,7 @@ def judged(fitted: Fitted, stages: Stages, options: DiagnoseOptions, *, even: bo
         begins[:, split.is_kept | split.is_scored],
         iterations=WHOLE,
     )
-    others = [float(whole.evidence.max() - best.evidence[0])]
+    others = [float(whole.evidence[whole.best] - best.evidence[0])]
     if fitted.traced is not None:
         others.append(traced_score(fitted.traced, split.kept, split.both, options.sensor_floor))
     score = replace(score, log_score=max(score.log_score, *others))

@@ -13,7 +13,7 @@ from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb, settled
-from pbrl_mismatch.search.fitted import Fitted, apart
+from pbrl_mismatch.search.fitted import Fitted, tops
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.ground import Ground
@@ -64,5 +64,4 @@ def held_starts(
     density = objective.likelihood(misfit) - 0.5 * objective.prior_misfit(draws)
     best = np.argsort(-density, kind="stable")[:CLIMBED]
     peak = climb(objective, draws[best], nuisance[best], iterations=STEPS, rough=True)
-    order = np.argsort(-np.nan_to_num(peak.evidence, nan=-np.inf), kind="stable")
-    return apart(peak.coordinates[order], hypothesis.spread, KEPT)
+    return tops(peak, KEPT)

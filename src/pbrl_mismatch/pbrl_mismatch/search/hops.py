@@ -72,8 +72,8 @@ def _hop(fitted: Fitted, cuts: Cuts, options: DiagnoseOptions, turn: int) -> Pea
     begun = np.where(np.arange(HOPS)[:, None, None] % 2, best.nuisance, 0.0)
     starts = np.concatenate([best.coordinates, beside]), np.concatenate([best.nuisance, begun])
     peak = climb(objective, *starts, iterations=STEPS, rough=True)
-    found = peak.take(np.array([int(np.argmax(np.nan_to_num(peak.evidence, nan=-np.inf)))]))
-    return best if found.evidence[0] <= best.evidence[0] else found
+    found = alone(peak)
+    return found if found.evidence[0] > best.evidence[0] else best
 
 
 def _ended(fitted: Fitted, cuts: Cuts, options: DiagnoseOptions) -> Peak:

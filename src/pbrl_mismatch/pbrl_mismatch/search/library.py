@@ -17,7 +17,7 @@ from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import Peak, climb
-from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart
+from pbrl_mismatch.search.fitted import Fitted, Stages, alone, tops
 from pbrl_mismatch.search.grip import GripEvidence
 from pbrl_mismatch.search.held import held_starts, holds
 from pbrl_mismatch.search.hypothesis import Hypothesis
@@ -150,10 +150,7 @@ def search_library(
             chosen = sorted({*chosen, *(k for k, (each, _) in enumerate(running) if each.variant in leading)})
             before = [peaks[k] for k in chosen]
             running = [
-                (
-                    each,
-                    apart(_ordered(peaks[k]).coordinates, each.spread, kept.get(each.variant, options.keep[stage + 1])),
-                )
+                (each, tops(peaks[k], kept.get(each.variant, options.keep[stage + 1])))
                 for k, each in ((k, running[k][0]) for k in chosen)
             ]
         done = [
@@ -214,10 +211,6 @@ def _same(name: str, base: Fitted, options: DiagnoseOptions) -> bool:
 
 def _climbed(cuts: Cuts, iterations: int, options: DiagnoseOptions, rough: bool, job: tuple[Hypothesis, Array]) -> Peak:
     return climb(Objective(job[0], cuts, options.sensor_floor), job[1], iterations=iterations, rough=rough)
-
-
-def _ordered(peak: Peak) -> Peak:
-    return peak.take(np.argsort(-peak.evidence, kind="stable"))
 
 
 def _of_ground(base: Fitted, ground: Ground, grip: GripEvidence | None) -> float:

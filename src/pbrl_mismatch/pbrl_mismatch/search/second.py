@@ -11,7 +11,7 @@ from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.fitted import Fitted, apart, scene_of
+from pbrl_mismatch.search.fitted import Fitted, scene_of, tops
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.splits import with_splits
@@ -52,5 +52,4 @@ def parted_starts(
     scene = scene_of(shortest.track, base.row)
     draws = hypothesis.believable(with_splits(rng, draws, columns, scene.size))
     peak = climb(Objective(hypothesis, shortest, options.sensor_floor), draws, iterations=STEPS, rough=True)
-    best = peak.coordinates[np.argsort(-peak.evidence, kind="stable")]
-    return apart(best, hypothesis.spread, KEPT)
+    return tops(peak, KEPT)
