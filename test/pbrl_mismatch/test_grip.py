@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -18,6 +18,7 @@ from pbrl_mismatch.kernels.columns import neutral_row
 from pbrl_mismatch.search.grip import (
     CAMERA_SPREAD,
     FREE_PLACE,
+    LASTS,
     NEW_RUBBER,
     NEW_RUBBER_SPREAD,
     POINT_SPREAD,
@@ -35,19 +36,30 @@ def turned(angle: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.column_stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]])
 
 
+def lasting(rng: np.random.Generator, spread: float, kept: float) -> np.ndarray:
+    """Draw (80, 2) of a spread, each with a share kept of the one before."""
+    drawn = spread * rng.standard_normal((80, 2))
+    for k in range(1, 80):
+        drawn[k] = kept * drawn[k - 1] + np.sqrt(1.0 - kept**2) * drawn[k]
+    return drawn
+
+
 def readings(
-    rng: np.random.Generator, compliance: float = NEW_RUBBER, play: float = 0.0, late: float = 0.0
+    rng: np.random.Generator, compliance: float = NEW_RUBBER, play: float = 0.0, late: float = 0.0, kept: float = 0.0
 ) -> GripTrack:
-    """Draw two grasps of forty readings, with an error of the gripper's point in each and one of the camera."""
+    """Draw two grasps of forty readings, with an error of the gripper's point in each and one of the camera.
+
+    Each reading has a share `kept` of the noise and of the force of the one before.
+    """
     grasp = np.repeat([0, 1], 40)
-    force = 12.0 * rng.standard_normal((80, 2))
+    force = lasting(rng, 12.0, kept)
     heading, turn = np.cumsum(0.1 * rng.standard_normal(80)), 0.3 * rng.standard_normal(80)
     velocity = 0.1 * rng.standard_normal((80, 2))
     place = 0.02 * rng.standard_normal((2, 2))[grasp]
     place += turned(turn, 0.005 * rng.standard_normal((2, 2))[grasp])
     place += turned(-heading, np.tile(0.005 * rng.standard_normal(2), (80, 1)))
     place += compliance * force + play * force / (np.hypot(*force.T)[:, None] + SOFT_FORCE) + late * velocity
-    place += NOISE * rng.standard_normal((80, 2))
+    place += lasting(rng, NOISE, kept)
     return GripTrack(grasp, np.arange(80.0), place, heading, turn, CONTACT[grasp], force, velocity)
 
 
@@ -81,8 +93,9 @@ def test_the_odds_of_a_tag_s_offset_are_those_of_the_gaussian_that_it_is() -> No
     )
 
 
-def test_the_evidence_is_that_of_the_gaussian_that_the_law_is() -> None:
-    grips = readings(np.random.default_rng(0), compliance=4e-4)
+@pytest.mark.parametrize("kept", [0.0, 0.5])
+def test_the_evidence_is_that_of_the_gaussian_that_the_law_is(kept: float) -> None:
+    grips = readings(np.random.default_rng(0), compliance=4e-4, kept=kept)
     found = grip_evidence(grips, DELAY)
     size = np.hypot(*grips.force.T)[:, None]
     laws = np.stack([grips.force, grips.force / (size + SOFT_FORCE), grips.velocity], -1).reshape(-1, 3)
@@ -98,14 +111,28 @@ def test_the_evidence_is_that_of_the_gaussian_that_the_law_is() -> None:
     places = np.array(own).T
     every = np.column_stack([places, laws])
     seen = grips.place.reshape(-1)
-    rest = seen - every @ np.linalg.lstsq(every, seen, rcond=None)[0]
-    variance = rest @ rest / (len(seen) - every.shape[1])
+    free, same = len(seen) - every.shape[1], np.repeat(grips.grasp, 2)[:, None] == np.repeat(grips.grasp, 2)
+
+    def restricted(tau: float) -> tuple[float, float, np.ndarray]:
+        """Return the log of the restricted likelihood, the noise's variance and its correlation (2 N, 2 N)."""
+        gap = np.abs(grips.time[:, None] - grips.time)
+        alike = np.exp(-gap / tau) if tau else np.eye(80)
+        noise = np.kron(alike, np.eye(2)) * same
+        inner = every.T @ np.linalg.solve(noise, every)
+        rest = seen - every @ np.linalg.solve(inner, every.T @ np.linalg.solve(noise, seen))
+        variance = float(rest @ np.linalg.solve(noise, rest)) / free
+        size = np.linalg.slogdet(noise)[1] + np.linalg.slogdet(inner)[1]
+        return -0.5 * float(size) - 0.5 * free * np.log(variance), variance, noise
+
+    _, variance, noise = max(map(restricted, LASTS), key=lambda each: each[0])
+    assert (noise[0, 2] > 0.3) == (kept > 0.0)
 
     def evidence(wide: list[float]) -> float:
         design, prior = np.column_stack([places, laws]), np.array([*spread, *wide])
-        covariance = (design * prior**2) @ design.T + variance * np.eye(len(seen))
+        covariance = (design * prior**2) @ design.T + variance * noise
         value = multivariate_normal.logpdf(seen - laws[:, 0] * NEW_RUBBER, np.zeros(len(seen)), covariance)
-        return float(value) + 0.5 * len(seen) * np.log(2.0 * np.pi * variance)
+        common = 0.5 * len(seen) * np.log(2.0 * np.pi * variance) + 0.5 * float(np.linalg.slogdet(noise)[1])
+        return float(value) + common
 
     soft = [parameter.spread for parameter in PARAMETERS]
     assert found.rigid.evidence == pytest.approx(evidence([NEW_RUBBER_SPREAD, 1e-9, DELAY]), abs=1e-3)
@@ -113,12 +140,15 @@ def test_the_evidence_is_that_of_the_gaussian_that_the_law_is() -> None:
     assert found.late.evidence == pytest.approx(evidence([NEW_RUBBER_SPREAD, 1e-9, 0.12]), abs=1e-3)
 
 
-def test_p_values_are_uniform_where_the_hold_is_as_it_should_be() -> None:
+@pytest.mark.parametrize("kept", [0.0, 0.3, 0.6])
+def test_p_values_are_uniform_where_the_hold_is_as_it_should_be(kept: float) -> None:
     rng = np.random.default_rng(1)
     values = []
     for _ in range(200):
         rubber = NEW_RUBBER + NEW_RUBBER_SPREAD * rng.standard_normal()
-        values.append(grip_evidence(readings(rng, rubber, late=DELAY * rng.standard_normal()), DELAY).p_value)
+        values.append(
+            grip_evidence(readings(rng, rubber, late=DELAY * rng.standard_normal(), kept=kept), DELAY).p_value
+        )
     assert kstest(values, "uniform").pvalue > 0.01, np.sort(values)
 
 
@@ -178,3 +208,11 @@ def test_where_no_gripper_was_seen_nothing_is_said(concealed_recording: Callable
     recording = concealed_recording("clean", 1)
     track = track_of(recording, "table")
     assert lay_grips(replace(recording, gripper_poses={}), track) is None
+
+
+def test_readings_too_few_to_know_their_noise_say_nothing() -> None:
+    grips = readings(np.random.default_rng(4))
+    for count in range(1, 7):
+        few = GripTrack(*(getattr(grips, each.name)[:count] for each in fields(grips)))
+        assert grip_evidence(few, DELAY) is None
+    assert grip_evidence(GripTrack(*(getattr(grips, each.name)[:12] for each in fields(grips))), DELAY) is not None

@@ -2,7 +2,7 @@
 
 The motion of a body under a felt wrench is the same however softly it is held. What the hold gives way is seen between
 the gripper's pose and the body's. The body's smoothed pose is off for some readings in a row, so that readings are
-taken together in groups whose errors are nearly their own.
+taken together in groups, of which neighbours still err somewhat alike.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FIRST = 0.6
 LEAST = 20
 """Readings of a grasp that are worth a look."""
 TOGETHER = 0.6
-"""Readings within so long are one: the errors of the body's smoothed pose are their own after about that time [s]."""
+"""Readings within so long are one: the body's smoothed pose errs alike for about that time [s]."""
 
 
 @dataclass(frozen=True)

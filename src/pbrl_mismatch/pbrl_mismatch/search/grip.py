@@ -9,6 +9,10 @@ between the plates, by `a`: where the gripper's point is on it is known but for 
 camera may see body and gripper off against each other by b in the world, which turns against the body as its heading
 h does. A tag that is glued on with an offset moves the contact that it makes one see: as the edge turns between the
 plates about the true one, the gripper's point swings about it.
+
+The noise is a smoothed pose's, and stays like itself as exp(-|t - t'| / tau) does: taken for independent, its slow
+swings would pass for a hold that gives way. tau has the largest restricted likelihood (Patterson and Thompson 1971),
+which counts what the fit has used up.
 """
 
 from __future__ import annotations
@@ -45,6 +49,10 @@ RANK = 1e-4
 """Directions of the places that are weaker than this share of the strongest are none."""
 LATE_SPREAD = 0.12
 """Of a delay that is a fault, as in the effect `time_offset` [s]."""
+LEAST_FREE = 8
+"""Numbers that the readings must have beyond what is learned of them, or their noise is not known."""
+LASTS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.9, 1.3, 2.0)
+"""How long the noise may be like itself [s]; none: each reading's is its own."""
 GIVES, PLAYS = 0, 1
 """Columns of what is learned beside the grasps' places."""
 
@@ -147,23 +155,23 @@ class GripEvidence:
         return max(gained)
 
 
-def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence:
-    """Weigh what may act between gripper and body.
+def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence | None:
+    """Weigh what may act between gripper and body; None where the readings are too few to say how noisy they are.
 
     Args:
         grips: readings.
         delay_spread: of a delay that is no fault [s].
     """
     laws, places, seen = _laws(grips)
-    tag = _tag_law(grips)
     known = _place_spread(places.shape[1])
     stiff, soft = (NEW_RUBBER_SPREAD, 1e-9), tuple(p.spread for p in PARAMETERS)
     # Noise from the richest law, freed of all of them: a hold that gives is no worse sensor.
     every = np.column_stack([places, laws])
-    own, _, rank, _ = np.linalg.lstsq(every, seen, rcond=RANK)
-    count = max(len(seen) - int(rank), 1)
-    rest = float(np.sum((seen - every @ own) ** 2))
-    variance = rest / count
+    noise = _noise(grips, every, seen)
+    if noise is None:
+        return None
+    laws, places, seen, tag = (noise.whitened(each) for each in (laws, places, seen, _tag_law(grips)))
+    variance = noise.rest / noise.count
     shifted = seen - laws[:, GIVES] * NEW_RUBBER
     design, both = np.column_stack([places, laws]), np.column_stack([shifted, tag])
 
@@ -182,7 +190,7 @@ def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence:
 
     found = {(gives, late): weigh(gives, late) for gives in (False, True) for late in (False, True)}
     usual = np.array([*stiff, delay_spread])
-    return GripEvidence(found, _p_value(laws, places, shifted, usual, rest, count))
+    return GripEvidence(found, _p_value(laws, places, shifted, usual, noise))
 
 
 def _laws(grips: GripTrack) -> tuple[Array, Array, Array]:
@@ -217,18 +225,69 @@ def _place_spread(columns: int) -> Array:
     return np.concatenate([np.full(grasps, FREE_PLACE), np.full(grasps, POINT_SPREAD), np.full(2, CAMERA_SPREAD)])
 
 
-def _p_value(laws: Array, places: Array, seen: Array, usual: Array, rest: float, count: int) -> float:
+@dataclass(frozen=True)
+class _Noise:
+    """Noise that is like itself for a while, and how likely it is.
+
+    Attributes:
+        kept: (N,) share of its last reading's noise that a reading has, 0 for the first of a grasp.
+        likelihood: log of its restricted likelihood [nat], up to a common constant.
+        rest: sum of squares that the richest law leaves, whitened [m^2].
+        count: degrees of freedom of those.
+    """
+
+    kept: Array
+    likelihood: float
+    rest: float
+    count: int
+
+    def whitened(self, rows: Array) -> Array:
+        """Return rows (2 N, ...) whose noise is independent."""
+        return _whitened(self.kept, rows)
+
+
+def _noise(grips: GripTrack, every: Array, seen: Array) -> _Noise | None:
+    """Find the noise beside the richest law (2 N, K) of what was seen (2 N,); None where too little is left to see."""
+    own, size, _ = np.linalg.svd(every, full_matrices=False)
+    own = own[:, size > RANK * size[0]]
+    gap, same = np.abs(np.diff(grips.time)), np.diff(grips.grasp) == 0
+    count = len(seen) - own.shape[1]
+    if count < LEAST_FREE:
+        return None
+
+    def lasting(tau: float) -> _Noise:
+        kept = np.concatenate([[0.0], np.exp(-gap / tau) * same if tau > 0.0 else 0.0 * gap])
+        basis, corner = np.linalg.qr(_whitened(kept, own))
+        white = _whitened(kept, seen)
+        left = white - basis @ (basis.T @ white)
+        rest = float(left @ left)
+        # Both axes have the same correlation: the root of its determinant is one axis's whole.
+        likelihood = -float(np.sum(np.log1p(-(kept**2)))) - float(np.sum(np.log(np.abs(np.diag(corner)))))
+        return _Noise(kept, likelihood - 0.5 * count * math.log(rest), rest, count)
+
+    return max(map(lasting, LASTS), key=lambda each: each.likelihood)
+
+
+def _whitened(kept: Array, rows: Array) -> Array:
+    """Return rows (2 N, ...) less what they keep (N,) of those before, at one size."""
+    pairs = rows.reshape(len(kept), -1)
+    own = np.sqrt(1.0 - kept**2)
+    white = (pairs - kept[:, None] * np.roll(pairs, 1, axis=0)) / own[:, None]
+    return np.asarray(white.reshape(rows.shape), dtype=np.float64)
+
+
+def _p_value(laws: Array, places: Array, seen: Array, usual: Array, noise: _Noise) -> float:
     """Return the F-test's p-value of what the laws explain beyond the grasps' places and what is usual of them."""
     own, size, _ = np.linalg.svd(places, full_matrices=False)
     own = own[:, size > RANK * size[0]]
     free = laws - own @ (own.T @ laws)
     target = seen - own @ (own.T @ seen)
     found, _, _, _ = np.linalg.lstsq(free, target, rcond=None)
-    variance = rest / count
+    variance = noise.rest / noise.count
     # Its covariance is the noise's and what is usual; the chi-square of the three, over three, is F.
     spread = variance * np.linalg.pinv(free.T @ free) + np.diag(usual**2)
     statistic = float(found @ np.linalg.solve(spread, found)) / len(found)
-    return float(f_distribution.sf(statistic, len(found), count))
+    return float(f_distribution.sf(statistic, len(found), noise.count))
 
 
 def beside_motion(fitted: Fitted, grip: GripEvidence | None) -> Fitted:
