@@ -15,6 +15,7 @@ from pbrl_mismatch.data.grip import GripTrack, lay_grips
 from pbrl_mismatch.effects.grasp_compliance import PARAMETERS
 from pbrl_mismatch.effects.pose_bias import PARAMETERS as TAG_PARAMETERS
 from pbrl_mismatch.kernels.columns import neutral_row
+from pbrl_mismatch.observability.power import needed
 from pbrl_mismatch.search.grip import (
     CAMERA_SPREAD,
     FREE_PLACE,
@@ -150,6 +151,23 @@ def test_p_values_are_uniform_where_the_hold_is_as_it_should_be(kept: float) -> 
             grip_evidence(readings(rng, rubber, late=DELAY * rng.standard_normal(), kept=kept), DELAY).p_value
         )
     assert kstest(values, "uniform").pvalue > 0.01, np.sort(values)
+
+
+@pytest.mark.parametrize("wanted", [0.5, 0.95])
+def test_a_soft_hold_is_noticed_as_often_as_its_distance_says(wanted: float) -> None:
+    rng, noticed = np.random.default_rng(6), []
+    for _ in range(200):
+        state = rng.bit_generator.state
+        found = grip_evidence(readings(rng), DELAY)
+        way = np.array([1e-4, 1e-3]) * rng.standard_normal(2)
+        way *= np.sqrt(needed(3, 0.05, wanted) / found.noncentrality(way[None])[0])
+        rubber = NEW_RUBBER + NEW_RUBBER_SPREAD * rng.standard_normal()
+        late = DELAY * rng.standard_normal()
+        again = np.random.default_rng()
+        again.bit_generator.state = state
+        held = grip_evidence(readings(again, rubber + way[0], way[1], late), DELAY)
+        noticed.append(held.p_value < 0.05)
+    assert abs(np.mean(noticed) - wanted) < 0.1
 
 
 @pytest.mark.parametrize(("compliance", "play"), [(6e-4, 0.0), (NEW_RUBBER, 4e-3), (5e-4, 3e-3)])

@@ -17,11 +17,12 @@ from pbrl_mismatch import EFFECTS, DiagnoseOptions, MismatchError, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.kernels.columns import COLUMN
-from pbrl_mismatch.observability.detectable import Sensitivity, could_not_show, detectable
+from pbrl_mismatch.observability.detectable import Detectable, Sensitivity, could_not_show, detectable
 from pbrl_mismatch.observability.power import needed, power
 from pbrl_mismatch.observability.strengths import STRENGTHS, scaled, size_of, strength_columns
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import Fitted, scene_of
+from pbrl_mismatch.search.grip import GripEvidence
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.objective import NUISANCES, Objective
 
@@ -95,6 +96,19 @@ def test_what_acts_on_all_motion_is_shown_and_what_is_elsewhere_is_not(ground: F
     assert hidden == {name for name, each in found.items() if not each.shown}
     assert "nowhere" in found["grasp_compliance"].sentence()
     json.dumps([each.to_report() for each in found.values()], allow_nan=False)
+
+
+def test_a_hold_that_gives_shows_between_gripper_and_body(ground: Fitted) -> None:
+    def told(spread: float) -> Detectable:
+        grip = GripEvidence({}, 1.0, np.diag([spread, 10.0 * spread, 0.01]) ** 2)
+        (found,) = detectable(np.random.default_rng(0), ground, ("grasp_compliance",), grip)
+        hidden = could_not_show(np.random.default_rng(0), ground, ("grasp_compliance",), grip)
+        assert bool(hidden) == (not found.shown)
+        return found
+
+    sharp, blunt = told(1e-5), told(1e-3)
+    assert sharp.shown and not blunt.shown and sharp.chance > 0.9 > blunt.chance
+    assert sharp.unit == "m/N" and blunt.smallest == pytest.approx(100.0 * sharp.smallest)
 
 
 def test_a_longer_recording_shows_weaker_effects(ground: Fitted) -> None:

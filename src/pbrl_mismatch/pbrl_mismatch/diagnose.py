@@ -37,7 +37,6 @@ from pbrl_mismatch.search.fitted import (
 from pbrl_mismatch.search.grip import beside_motion, grip_evidence
 from pbrl_mismatch.search.heldout import noise_floor
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.library import IN_ANOTHER_CHANNEL
 from pbrl_mismatch.search.posterior import with_draws
 from pbrl_mismatch.search.predictive import Verdict, predictive_test
 from pbrl_mismatch.search.told_baseline import ToldBaseline, baseline_from_model
@@ -266,8 +265,7 @@ def _diagnose_object(
     floor = noise_floor(stages.split.told) if stages.split is not None else (math.nan, math.nan)
     named = found.effects[0].fitted if found.effects else baseline
     left = _unexplained(baseline, weighed[0].fitted if weighed else baseline)
-    known = {*named.hypothesis.effects, *IN_ANOTHER_CHANNEL}
-    shown_by_motion = [name for name in options.effects if name not in known]
+    absent = [name for name in options.effects if name not in named.hypothesis.effects]
     report = {
         "mismatch": mismatch,
         "p_value": verdict.p_value,
@@ -276,7 +274,7 @@ def _diagnose_object(
         "unexplained_fraction": left,
         "unknown": mismatch and not found.effects,
         "heldout": held_out_report(baseline, named, floor),
-        "not_shown": [each.to_report() for each in could_not_show(rng, named, shown_by_motion)],
+        "not_shown": [each.to_report() for each in could_not_show(rng, named, absent, grip)],
         "unknown_description": None,
     }
     notes = [sentence(track.object, mismatch, verdict, found), *found.notes, *missing_notes(track)]

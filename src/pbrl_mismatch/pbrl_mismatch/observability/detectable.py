@@ -4,14 +4,16 @@ At a fitted model, an effect of a strength s at a place and with other parameter
 poses by d(s). Whitened by the noise and freed of what the windows' unknown starts, the sensor's own error and the
 model's own parameters can take up, its squared length is the noncentrality of the test; for small effects it grows as
 s squared. The strength at which 95 % of recordings with this motion and noise would have shown the effect follows
-from it; of many draws, the median is told.
+from it; of many draws, the median is told. A hold that gives shows between gripper and body instead, where the
+noncentrality is that of the readings' linear law.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,11 +21,13 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.effects.effect import Scene
+from pbrl_mismatch.effects.grasp_compliance import PARAMETERS as HOLD
 from pbrl_mismatch.effects.registry import EFFECTS, effect_named
 from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.observability.power import needed, power
 from pbrl_mismatch.observability.strengths import rounded, scaled, size_of, strength_columns, unit_of, without_others
 from pbrl_mismatch.search.fitted import Fitted, scene_of
+from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence
 from pbrl_mismatch.search.objective import START, Linear, reduce
 
 Array = NDArray[np.float64]
@@ -87,7 +91,12 @@ class Detectable:
 
 
 def could_not_show(
-    rng: np.random.Generator, ground: Fitted, effects: Sequence[str] | None = None, *, level: float = 0.05
+    rng: np.random.Generator,
+    ground: Fitted,
+    effects: Sequence[str] | None = None,
+    grip: GripEvidence | None = None,
+    *,
+    level: float = 0.05,
 ) -> tuple[Detectable, ...]:
     """Return the effects that this recording could not have shown, those it came nearest to last.
 
@@ -95,9 +104,10 @@ def could_not_show(
         rng: of places and moments.
         ground: the model that is believed: the repaired one, or the baseline.
         effects: names; None: all of the library that are not in `ground`.
+        grip: what the grippers' poses say; None where that is nothing.
         level: of false alarms of the test.
     """
-    found = [each for each in detectable(rng, ground, effects, level=level) if not each.shown]
+    found = [each for each in detectable(rng, ground, effects, grip, level=level) if not each.shown]
     return tuple(sorted(found, key=lambda each: (each.chance, each.effect)))
 
 
@@ -105,6 +115,7 @@ def detectable(
     rng: np.random.Generator,
     ground: Fitted,
     effects: Sequence[str] | None = None,
+    grip: GripEvidence | None = None,
     *,
     level: float = 0.05,
     wanted: float = 0.95,
@@ -116,6 +127,7 @@ def detectable(
         rng: of places and moments.
         ground: the model that is believed.
         effects: names; None: all of the library that are not in `ground`.
+        grip: what the grippers' poses say; None where that is nothing.
         level: of false alarms of the test.
         wanted: power.
         draws: of each variant's prior.
@@ -132,8 +144,10 @@ def detectable(
         effect = effect_named(name)
         if name in ground.hypothesis.effects:
             continue
+        shows = motion.noncentrality if grip is None or name != GRASP_COMPLIANCE else partial(_between, grip)
         tried = [
-            _variant(rng, motion, scene, name, variant, level, wanted, draws) for variant in range(len(effect.variants))
+            _variant(rng, ground, shows, scene, name, variant, level, wanted, draws)
+            for variant in range(len(effect.variants))
         ]
         out.append(min(tried, key=lambda each: (each.smallest / each.plausible, -each.chance)))
     return tuple(out)
@@ -175,9 +189,15 @@ class Sensitivity:
         return np.maximum(np.diag(joint)[own:] - taken, 0.0)
 
 
+def _between(grip: GripEvidence, rows: Array) -> Array:
+    """Return (P,) how far rows (P, WIDTH) are off a hold as it should be, in squared standard deviations."""
+    return grip.noncentrality(rows[:, [COLUMN[each.column] for each in HOLD]])
+
+
 def _variant(
     rng: np.random.Generator,
-    motion: Sensitivity,
+    ground: Fitted,
+    shows: Callable[[Array], Array],
     scene: Scene,
     name: str,
     variant: int,
@@ -185,7 +205,7 @@ def _variant(
     wanted: float,
     draws: int,
 ) -> Detectable:
-    effect, ground = EFFECTS[name], motion.ground
+    effect = EFFECTS[name]
     hypothesis = ground.hypothesis.with_effect(effect, scene, variant)
     free = effect.variants[variant]
     columns = strength_columns(name, free)
@@ -195,7 +215,7 @@ def _variant(
     for column in ground.hypothesis.columns:
         rows[:, COLUMN[column]] = ground.row[COLUMN[column]]
     target = needed(len(free), level, wanted)
-    found = motion.noncentrality(rows)
+    found = shows(rows)
     chance = float(np.mean(power(found, len(free), level)))
     factor = np.ones(draws)
     for _ in range(ROUNDS):
@@ -205,6 +225,6 @@ def _variant(
             (factor < CHANGES[0]) | (factor > CHANGES[1]), np.where(factor < 1.0, CHANGES[0], np.inf), factor
         )
         trial = scaled(rows, columns, np.where(np.isfinite(factor), factor, 1.0))
-        found = np.where(np.isfinite(factor), motion.noncentrality(trial), 0.0)
+        found = np.where(np.isfinite(factor), shows(trial), 0.0)
     strength = np.where(np.isfinite(factor), size_of(trial, columns), np.inf)
     return Detectable(name, float(np.median(strength)), plausible, unit_of(columns), chance, effect.shows)

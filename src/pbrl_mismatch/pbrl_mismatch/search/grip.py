@@ -92,10 +92,12 @@ class GripEvidence:
     Attributes:
         laws: by whether the hold gives way, and whether the body's poses are late against the gripper's.
         p_value: chance of so large a misfit if the hold is as it should be and no stream late.
+        spread: (3, 3) covariance of compliance [m/N], play [m] and lateness [s] that the readings find in such a hold.
     """
 
     laws: Mapping[tuple[bool, bool], GripLaw]
     p_value: float
+    spread: Array
 
     @property
     def rigid(self) -> GripLaw:
@@ -111,6 +113,11 @@ class GripEvidence:
     def late(self) -> GripLaw:
         """Return that the body's poses are late."""
         return self.laws[False, True]
+
+    def noncentrality(self, holds: Array) -> Array:
+        """Return (P,) squared distances, in spreads, of holds (P, 2) that give more than new rubber [m/N, m]."""
+        precision = np.linalg.inv(self.spread)[: PLAYS + 1, : PLAYS + 1]
+        return np.einsum("pi,ij,pj->p", holds, precision, holds)
 
     def beside(self, hypothesis: Hypothesis, coordinates: Array, covariance: Array) -> float:
         """Return the log evidence of the readings for a hypothesis, of which the motion is known [nat].
@@ -190,7 +197,10 @@ def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence | None:
 
     found = {(gives, late): weigh(gives, late) for gives in (False, True) for late in (False, True)}
     usual = np.array([*stiff, delay_spread])
-    return GripEvidence(found, _p_value(laws, places, shifted, usual, noise))
+    mean, wide = _least_squares(laws, places, shifted, usual, noise)
+    statistic = float(mean @ np.linalg.solve(wide, mean)) / len(mean)
+    # The chi-square of the three, over three, is F where the noise is estimated.
+    return GripEvidence(found, float(f_distribution.sf(statistic, len(mean), noise.count)), wide)
 
 
 def _laws(grips: GripTrack) -> tuple[Array, Array, Array]:
@@ -276,18 +286,14 @@ def _whitened(kept: Array, rows: Array) -> Array:
     return np.asarray(white.reshape(rows.shape), dtype=np.float64)
 
 
-def _p_value(laws: Array, places: Array, seen: Array, usual: Array, noise: _Noise) -> float:
-    """Return the F-test's p-value of what the laws explain beyond the grasps' places and what is usual of them."""
+def _least_squares(laws: Array, places: Array, seen: Array, usual: Array, noise: _Noise) -> tuple[Array, Array]:
+    """Return what the laws explain beyond the grasps' places (3,), and its covariance if all is as usual (3, 3)."""
     own, size, _ = np.linalg.svd(places, full_matrices=False)
     own = own[:, size > RANK * size[0]]
     free = laws - own @ (own.T @ laws)
-    target = seen - own @ (own.T @ seen)
-    found, _, _, _ = np.linalg.lstsq(free, target, rcond=None)
-    variance = noise.rest / noise.count
-    # Its covariance is the noise's and what is usual; the chi-square of the three, over three, is F.
-    spread = variance * np.linalg.pinv(free.T @ free) + np.diag(usual**2)
-    statistic = float(found @ np.linalg.solve(spread, found)) / len(found)
-    return float(f_distribution.sf(statistic, len(found), noise.count))
+    mean, _, _, _ = np.linalg.lstsq(free, seen - own @ (own.T @ seen), rcond=None)
+    covariance = noise.rest / noise.count * np.linalg.pinv(free.T @ free) + np.diag(usual**2)
+    return np.asarray(mean, dtype=np.float64), np.asarray(covariance, dtype=np.float64)
 
 
 def beside_motion(fitted: Fitted, grip: GripEvidence | None) -> Fitted:
