@@ -61,7 +61,7 @@ def test_what_only_the_grippers_poses_show_is_worth_simulating(
     law = GripLaw(-190.0, np.zeros(3), np.eye(3), np.zeros(3), np.eye(3))
     late = replace(law, evidence=-120.0)
     laws = {(gives, is_late): late if is_late else law for gives in (False, True) for is_late in (False, True)}
-    grip = GripEvidence(laws, 1e-9)
+    grip = GripEvidence(laws, 1e-9, np.eye(3))
     options = OPTIONS.model_copy(update={"without": tuple(n for n in OPTIONS.without if n != "time_offset")})
     base = beside_motion(base, grip)
     assert not search_library(np.random.SeedSequence(0), track, [base], stages, options, WORTH)
