@@ -6,29 +6,39 @@ import itertools
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
 
-from pbrl_bag.types import BodyGeometry, PoseStream, Recording
+from pbrl_bag import read_recording, write_recording
+from pbrl_bag.types import BodyGeometry, Grasp, PoseStream, Recording, WrenchStream
 from pbrl_bringup.commands.bench import command
+from pbrl_bringup.concealed import sets
+from pbrl_bringup.concealed.cases import Case, Made
 from pbrl_bringup.concealed.draws import DRAWS
 from pbrl_bringup.concealed.furnished import PART_OF_IT
 from pbrl_bringup.concealed.sets import (
     FIRST_SEED,
+    OUT_OF_STEP,
     OUTLINE_OFF,
     QUICK_EFFECTS,
     ROUGHLY,
     SETS,
     SPARE_STEP,
     SPARES,
+    Trial,
     draw_pairs,
     evenly,
     go_together,
+    make_trial,
+    out_of_step,
     told_roughly,
     trials_of,
 )
+from pbrl_bringup.concealed.truth import Truth
 from pbrl_bringup.errors import BringupError
+from pbrl_mismatch.options import DiagnoseOptions
 
 
 def small_recording() -> Recording:
@@ -37,7 +47,9 @@ def small_recording() -> Recording:
     upright = np.tile([0.0, 0.0, 0.0, 1.0], (5, 1))
     stream = PoseStream(time, np.zeros((5, 3)), upright)
     body = BodyGeometry("table", outline, 0.7, 20.0, True, np.zeros(3))
-    return Recording(Path("x"), {"table": body}, {"table": stream}, {"left": stream}, {}, ())
+    wrench = WrenchStream(time, np.ones((5, 3)), np.zeros((5, 3)))
+    grasp = Grasp("left", "table", 0.5, 3.5, np.zeros(2))
+    return Recording(Path("x"), {"table": body}, {"table": stream}, {"left": stream}, {"left": wrench}, (grasp,))
 
 
 def test_a_full_run_has_every_set_as_the_acceptance_asks() -> None:
@@ -136,3 +148,35 @@ def test_telling_roughly_keeps_what_was_seen_and_bounds_what_is_wrong() -> None:
     again = told_roughly(recording, np.random.default_rng(7))
     assert again.bodies["table"].nominal_mass == told[7].bodies["table"].nominal_mass
     assert replace(recording).bodies["table"].nominal_mass == 20.0
+
+
+@pytest.mark.parametrize("late", [0.25, -0.25])
+def test_tags_out_of_step_are_late_against_all_else_and_a_bag_can_hold_that(late: float, tmp_path: Path) -> None:
+    made = small_recording()
+    off = out_of_step(made, late)
+    write_recording(off, tmp_path / "bag")
+    for each in (off, read_recording(tmp_path / "bag")):
+        (grasp,) = each.grasps
+        assert grasp.end - grasp.start == pytest.approx(3.0, abs=1e-6)
+        np.testing.assert_allclose(each.object_poses["table"].time - grasp.start, np.arange(5.0) - 0.5 + late)
+        np.testing.assert_allclose(each.gripper_poses["left"].time - grasp.start, np.arange(5.0) - 0.5)
+        np.testing.assert_allclose(each.wrenches["left"].time - grasp.start, np.arange(5.0) - 0.5)
+    assert off.object_poses["table"].position is made.object_poses["table"].position
+
+
+def test_clean_recordings_are_out_of_step_and_no_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    truth = Truth((), "table", {}, {}, {}, 0.0, {})
+    monkeypatch.setattr(sets, "make", lambda _: Made(small_recording(), truth))
+
+    def late(of: str, seed: int) -> float:
+        found = make_trial(Trial(of, Case((), seed)), _learns_nothing).recording
+        return float(found.object_poses["table"].time[0] - found.wrenches["left"].time[0])
+
+    assert np.std([late("clean", seed) for seed in range(300)]) == pytest.approx(OUT_OF_STEP, rel=0.15)
+    assert late("clean", 3) == late("clean", 3) != late("clean", 4)
+    assert {late(of, seed) for of in ("single", "rough", "withheld", "pairs") for seed in range(5)} == {0.0}
+    assert DiagnoseOptions().delay_spread == OUT_OF_STEP, "as much as a diagnosis takes for no fault"
+
+
+def _learns_nothing(*_: object) -> NoReturn:
+    raise AssertionError("expected no model to be learned where nothing is furnished")
