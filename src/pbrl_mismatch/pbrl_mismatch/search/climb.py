@@ -119,63 +119,99 @@ def climb(
         spread: (P, W, R, NUISANCES) slopes in the nuisances to begin with; None: taken at the starts.
     """
     u = objective.hypothesis.believable(coordinates)
-    z = objective.at_rest(len(u)) if nuisance is None else nuisance.copy()
-    damping = np.full(len(u), FIRST_DAMPING)
-    prior_precision = objective.hypothesis.spread**-2.0
-    gained, idle = np.full(len(u), math.inf), np.zeros(len(u), dtype=np.int64)
-    most = 3.0 * objective.hypothesis.spread
+    walk = _Walk(
+        u,
+        objective.at_rest(len(u)) if nuisance is None else nuisance.copy(),
+        np.full(len(u), FIRST_DAMPING),
+        np.full(len(u), math.inf),
+        Holding(len(u), objective.hypothesis.spread**-2.0),
+    )
+    idle = np.zeros(len(u), dtype=np.int64)
     stale = 0 if spread is None else 1
     slopes = None if spread is None else spread.copy()
-    holding = Holding(len(u), prior_precision)
     for iteration in range(iterations):
         on = np.flatnonzero(idle < PATIENCE)
         if len(on) == 0:
             break
         # How the start and a steady wrench move the poses hardly depends on what acts besides.
         fresh = (iteration + stale) % FRESH == 0
-        linear = objective.linearise(u[on], z[on], None if fresh or slopes is None else slopes[on])
+        linear = objective.linearise(walk.u[on], walk.z[on], None if fresh or slopes is None else slopes[on])
         slopes = _kept(slopes, on, linear.spread)
-        z[on], residual, _ = settled(objective, u[on], z[on], linear.spread, linear.residual)
-        linear = replace(linear, residual=residual)
-        reduced = reduce(linear, z[on])
-        misfit = objective.misfit(linear.residual, z[on])
-        cost = _cost(objective, u[on], misfit)
-        gained[on] = 0.0
-        open_rows = np.arange(len(on))
-        matrix, vector = reduced.weighed(objective.weights(misfit))
-        curvature, quiet = matrix + np.diag(prior_precision), of_little(matrix, prior_precision)
-        pull = vector - (u[on] - objective.hypothesis.mean) * prior_precision
-        for _ in range(TRIALS):
-            now = on[open_rows]
-            damped = curvature[open_rows] + damping[now, None, None] * _diagonal(curvature[open_rows])
-            damped += holding.added(now, quiet[open_rows])
-            step = np.linalg.solve(damped, pull[open_rows, :, None])[..., 0]
-            step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
-            step = objective.hypothesis.believable(u[now] + step) - u[now]
-            shift = reduced.shift[open_rows] - (reduced.gain[open_rows] @ step[:, None, :, None])[..., 0]
-            trial_u, trial_z = u[now] + step, z[now] + shift
-            trial_z, _, misfit = settled(objective, trial_u, trial_z, slopes[now])
-            trial = _cost(objective, trial_u, misfit)
-            better = trial < cost[open_rows]
-            rows = now[better]
-            u[rows], z[rows] = trial_u[better], trial_z[better]
-            gained[rows] = 0.5 * (cost[open_rows[better]] - trial[better])
-            damping[rows] = np.maximum(damping[rows] * EASIER, LEAST_DAMPING)
-            holding.stepped(rows, gained[rows])
-            open_rows, now = open_rows[~better], now[~better]
-            # First without what is quiet, and only then a shorter step.
-            shorter = holding.failed(now, quiet[open_rows])
-            damping[shorter] = np.minimum(damping[shorter] * HARDER, MOST_DAMPING)
-            if len(open_rows) == 0:
-                break
-        idle[on] = np.where(gained[on] < SETTLED, idle[on] + 1, 0)
-        if np.all(gained < SETTLED):
+        walk.z[on], residual, misfit = settled(objective, walk.u[on], walk.z[on], linear.spread, linear.residual)
+        walk.gained[on] = 0.0
+        _step(objective, walk, on, reduce(replace(linear, residual=residual), walk.z[on]), misfit, slopes)
+        idle[on] = np.where(walk.gained[on] < SETTLED, idle[on] + 1, 0)
+        if np.all(walk.gained < SETTLED):
             break
-    linear = objective.linearise(u, z, slopes if rough else None)
-    reduced = reduce(linear, z)
-    misfit = objective.misfit(linear.residual, z)
-    evidence = log_evidence(objective, u, misfit, reduced)
-    return Peak(objective, u, z, misfit, objective.weights(misfit), reduced, evidence, gained < 1.0)
+    linear = objective.linearise(walk.u, walk.z, slopes if rough else None)
+    reduced = reduce(linear, walk.z)
+    misfit = objective.misfit(linear.residual, walk.z)
+    evidence = log_evidence(objective, walk.u, misfit, reduced)
+    weight, ended = objective.weights(misfit), walk.gained < 1.0
+    return Peak(objective, walk.u, walk.z, misfit, weight, reduced, evidence, ended)
+
+
+@dataclass
+class _Walk:
+    """Where a climb's P starts are on their way.
+
+    Attributes:
+        u: (P, K) coordinates.
+        z: (P, W, NUISANCES) nuisances.
+        damping: (P,) of the next step.
+        gained: (P,) by the last step [nat].
+        holding: which starts step without what the data say nothing of.
+    """
+
+    u: Array
+    z: Array
+    damping: Array
+    gained: Array
+    holding: Holding
+
+
+def _step(
+    objective: Objective, walk: _Walk, on: NDArray[np.int64], reduced: Reduced, misfit: Array, slopes: Array
+) -> None:
+    """Move starts by a step that gains, a shorter one where the first does not; where none does, leave them.
+
+    Args:
+        objective: see `climb`.
+        walk: changed.
+        on: which starts.
+        reduced: normal equations of those.
+        misfit: (len(on), W) there.
+        slopes: (P, W, R, NUISANCES) in the nuisances, of all starts.
+    """
+    hypothesis, prior_precision = objective.hypothesis, objective.hypothesis.spread**-2.0
+    cost, most = _cost(objective, walk.u[on], misfit), 3.0 * hypothesis.spread
+    matrix, vector = reduced.weighed(objective.weights(misfit))
+    curvature, quiet = matrix + np.diag(prior_precision), of_little(matrix, prior_precision)
+    pull = vector - (walk.u[on] - hypothesis.mean) * prior_precision
+    open_rows = np.arange(len(on))
+    for _ in range(TRIALS):
+        now = on[open_rows]
+        damped = curvature[open_rows] + walk.damping[now, None, None] * _diagonal(curvature[open_rows])
+        damped += walk.holding.added(now, quiet[open_rows])
+        step = np.linalg.solve(damped, pull[open_rows, :, None])[..., 0]
+        step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
+        step = hypothesis.believable(walk.u[now] + step) - walk.u[now]
+        shift = reduced.shift[open_rows] - (reduced.gain[open_rows] @ step[:, None, :, None])[..., 0]
+        trial_u, trial_z = walk.u[now] + step, walk.z[now] + shift
+        trial_z, _, found = settled(objective, trial_u, trial_z, slopes[now])
+        trial = _cost(objective, trial_u, found)
+        better = trial < cost[open_rows]
+        rows = now[better]
+        walk.u[rows], walk.z[rows] = trial_u[better], trial_z[better]
+        walk.gained[rows] = 0.5 * (cost[open_rows[better]] - trial[better])
+        walk.damping[rows] = np.maximum(walk.damping[rows] * EASIER, LEAST_DAMPING)
+        walk.holding.stepped(rows, walk.gained[rows])
+        open_rows, now = open_rows[~better], now[~better]
+        # First without what is quiet, and only then a shorter step.
+        shorter = walk.holding.failed(now, quiet[open_rows])
+        walk.damping[shorter] = np.minimum(walk.damping[shorter] * HARDER, MOST_DAMPING)
+        if len(open_rows) == 0:
+            break
 
 
 def settled(
