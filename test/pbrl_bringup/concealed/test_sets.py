@@ -20,7 +20,6 @@ from pbrl_bringup.concealed.draws import DRAWS
 from pbrl_bringup.concealed.furnished import PART_OF_IT
 from pbrl_bringup.concealed.sets import (
     FIRST_SEED,
-    OUT_OF_STEP,
     OUTLINE_OFF,
     QUICK_EFFECTS,
     ROUGHLY,
@@ -172,10 +171,11 @@ def test_clean_recordings_are_out_of_step_and_no_others(monkeypatch: pytest.Monk
         found = make_trial(Trial(of, Case((), seed)), _learns_nothing).recording
         return float(found.object_poses["table"].time[0] - found.wrenches["left"].time[0])
 
-    assert np.std([late("clean", seed) for seed in range(300)]) == pytest.approx(OUT_OF_STEP, rel=0.15)
+    assert np.std([late("clean", seed) for seed in range(300)]) == pytest.approx(
+        DiagnoseOptions().delay_spread, rel=0.15
+    )
     assert late("clean", 3) == late("clean", 3) != late("clean", 4)
     assert {late(of, seed) for of in ("single", "rough", "withheld", "pairs") for seed in range(5)} == {0.0}
-    assert DiagnoseOptions().delay_spread == OUT_OF_STEP, "as much as a diagnosis takes for no fault"
 
 
 def _learns_nothing(*_: object) -> NoReturn:

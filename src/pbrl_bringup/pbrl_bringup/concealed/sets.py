@@ -23,6 +23,7 @@ from pbrl_bringup.concealed.oracle import Oracle
 from pbrl_bringup.concealed.stage import Stage
 from pbrl_bringup.concealed.truth import Truth
 from pbrl_bringup.errors import BringupError
+from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.told_baseline import ToldBaseline
 
 Array = NDArray[np.float64]
@@ -52,11 +53,6 @@ QUICK_SETS, QUICK_CLEAN, QUICK_EFFECTS = ("clean", "single"), 2, ("payload_chang
 MASS_OFF, TURN_OFF, OUTLINE_OFF = 0.2, 0.1, 0.02
 """What is told wrongly in "rough": mass (of its logarithm), grasp direction [rad], as standard deviations; sides of the
 outline at most [m]."""
-OUT_OF_STEP = 0.02
-"""How late the tags of a clean recording come, as a standard deviation [s]: what a diagnosis takes for no fault.
-
-A test that allows for it is even only where there is some: where streams keep step, chance is told too large.
-"""
 ROUGHLY = {"mass_spread": MASS_OFF, "grasp_spread": TURN_OFF, "outline_spread": OUTLINE_OFF / math.sqrt(3.0)}
 """The same as a diagnosis is told it, all as standard deviations."""
 APART = (
@@ -230,7 +226,8 @@ def _plain(case: Case, of: str) -> MadeTrial:
     if of == "rough":
         recording = told_roughly(recording, rng)
     if of == "clean":
-        recording = out_of_step(recording, OUT_OF_STEP * rng.standard_normal())
+        # A test that allows for streams out of step is even only where some are.
+        recording = out_of_step(recording, DiagnoseOptions().delay_spread * rng.standard_normal())
     return MadeTrial(recording, made.truth, made.oracle)
 
 
