@@ -154,20 +154,21 @@ def test_p_values_are_uniform_where_the_hold_is_as_it_should_be(kept: float) -> 
 
 
 @pytest.mark.parametrize("wanted", [0.5, 0.95])
-def test_a_soft_hold_is_noticed_as_often_as_its_distance_says(wanted: float) -> None:
+def test_a_soft_hold_is_noticed_at_least_as_often_as_its_distance_says(wanted: float) -> None:
+    """Of three numbers a test to one side counts two in the mean; what is faint it sees a little more often."""
     rng, noticed = np.random.default_rng(6), []
     for _ in range(200):
         state = rng.bit_generator.state
         found = grip_evidence(readings(rng), DELAY)
-        way = np.array([1e-4, 1e-3]) * rng.standard_normal(2)
-        way *= np.sqrt(needed(3, 0.05, wanted) / found.noncentrality(way[None])[0])
+        way = np.array([1e-4, 1e-3]) * np.abs(rng.standard_normal(2))
+        way *= np.sqrt(needed(2, 0.05, wanted) / found.noncentrality(way[None])[0])
         rubber = NEW_RUBBER + NEW_RUBBER_SPREAD * rng.standard_normal()
         late = DELAY * rng.standard_normal()
         again = np.random.default_rng()
         again.bit_generator.state = state
         held = grip_evidence(readings(again, rubber + way[0], way[1], late), DELAY)
         noticed.append(held.p_value < 0.05)
-    assert abs(np.mean(noticed) - wanted) < 0.1
+    assert wanted - 0.05 < np.mean(noticed) < wanted + 0.15
 
 
 @pytest.mark.parametrize(("compliance", "play"), [(6e-4, 0.0), (NEW_RUBBER, 4e-3), (5e-4, 3e-3)])
@@ -182,6 +183,27 @@ def test_a_hold_that_gives_is_seen_and_measured(compliance: float, play: float) 
             )
         )
     assert 0.6 < np.mean(np.square(off)) < 1.6
+
+
+@pytest.mark.parametrize(("compliance", "play"), [(-6e-4, 0.0), (NEW_RUBBER, -4e-3)])
+def test_no_hold_gives_way_against_the_force(compliance: float, play: float) -> None:
+    rng = np.random.default_rng(4)
+    values = [grip_evidence(readings(rng, compliance, play), DELAY).p_value for _ in range(40)]
+    assert min(values) > 1e-3 and np.mean(np.array(values) < 0.05) < 0.1
+
+
+def test_how_a_smoother_bends_the_path_is_no_way_of_the_hold(concealed_recording: Callable[..., Recording]) -> None:
+    recording = concealed_recording("clean", 1)
+    track = track_of(recording, "table")
+    bent = 1e-3 * np.sin(2.0 * np.pi * track.clock / 3.0)
+    seen = track.seen.copy()
+    for begin, last in zip(track.begin, track.last, strict=True):
+        rows = slice(int(begin), int(last) + 1)
+        # What holds on is where the contact is at first: that stays.
+        seen[rows, :2] += (bent[rows] * (track.clock[rows] > track.clock[rows][0] + 2.0))[:, None]
+    straight, found = (lay_grips(recording, each) for each in (track, replace(track, seen=seen)))
+    moved = np.hypot(*(found.place - straight.place).T)
+    assert np.median(moved) < 1e-4 and np.quantile(moved, 0.9) < 3e-4
 
 
 def test_poses_that_are_late_are_no_soft_hold() -> None:

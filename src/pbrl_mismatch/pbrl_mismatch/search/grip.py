@@ -10,7 +10,7 @@ camera may see body and gripper off against each other by b in the world, which 
 h does. A tag that is glued on with an offset moves the contact that it makes one see: as the edge turns between the
 plates about the true one, the gripper's point swings about it.
 
-The noise is a smoothed pose's, and stays like itself as exp(-|t - t'| / tau) does: taken for independent, its slow
+The noise is that of means of poses, and stays like itself as exp(-|t - t'| / tau) does: taken for independent, its slow
 swings would pass for a hold that gives way. tau has the largest restricted likelihood (Patterson and Thompson 1971),
 which counts what the fit has used up.
 """
@@ -24,7 +24,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
-from scipy.stats import f as f_distribution
 
 from pbrl_mismatch.data.grip import GripTrack
 from pbrl_mismatch.effects.grasp_compliance import PARAMETERS
@@ -33,6 +32,7 @@ from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Reduced
+from pbrl_mismatch.search.one_sided import one_sided
 
 Array = NDArray[np.float64]
 
@@ -91,7 +91,8 @@ class GripEvidence:
 
     Attributes:
         laws: by whether the hold gives way, and whether the body's poses are late against the gripper's.
-        p_value: chance of so large a misfit if the hold is as it should be and no stream late.
+        p_value: chance of so large a misfit if the hold is as it should be and no stream late; of one with the force,
+            for a hold gives way to no other side.
         spread: (3, 3) covariance of compliance [m/N], play [m] and lateness [s] that the readings find in such a hold.
     """
 
@@ -198,9 +199,8 @@ def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence | None:
     found = {(gives, late): weigh(gives, late) for gives in (False, True) for late in (False, True)}
     usual = np.array([*stiff, delay_spread])
     mean, wide = _least_squares(laws, places, shifted, usual, noise)
-    statistic = float(mean @ np.linalg.solve(wide, mean)) / len(mean)
-    # The chi-square of the three, over three, is F where the noise is estimated.
-    return GripEvidence(found, float(f_distribution.sf(statistic, len(mean), noise.count)), wide)
+    # No hold gives way against the force: what looks like that is chance, and is no alarm.
+    return GripEvidence(found, one_sided(mean, wide, noise.count), wide)
 
 
 def _laws(grips: GripTrack) -> tuple[Array, Array, Array]:
