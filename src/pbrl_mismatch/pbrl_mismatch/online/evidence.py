@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_mismatch.data.simulation import poses
+from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.search.objective import NUISANCES, Objective
-from pbrl_mismatch.search.predictive import KNOTS, TEST_STEP
+from pbrl_mismatch.search.predictive import pushed
 
 Array = NDArray[np.float64]
 
@@ -86,21 +86,21 @@ def look(objective: Objective, coordinates: Array, covariance: Array) -> Window:
         coordinates: (K,) where the parameters are thought to be.
         covariance: (K, K) how well.
     """
-    centred, spread, slope, z = linearised(objective, coordinates)
+    centred, spread, slope = linearised(objective, coordinates)
     noise = np.eye(len(centred)) + spread @ spread.T
     lower = np.linalg.cholesky(noise + slope @ covariance @ slope.T)
-    push = _pushes(objective, coordinates[None], z).T
+    mass = float(objective.hypothesis.rows(coordinates[None])[0, at.MASS])
+    push = pushed(objective.cuts, mass)[0][_seen(objective)]
     left, strength, _ = np.linalg.svd(np.linalg.solve(lower, push), full_matrices=False)
     residual = np.linalg.solve(lower, centred)
     return Window(residual, np.linalg.solve(lower, slope), strength, left.T @ residual)
 
 
-def linearised(objective: Objective, coordinates: Array) -> tuple[Array, Array, Array, Array]:
+def linearised(objective: Objective, coordinates: Array) -> tuple[Array, Array, Array]:
     """Linearise the single window of an objective.
 
     Returns:
-        Residual (n,) with no nuisances, slopes in nuisances (n, NUISANCES) and parameters (n, K) of what was seen, and
-        the nuisances (1, 1, NUISANCES) at which that was done.
+        Residual (n,) with no nuisances, slopes in nuisances (n, NUISANCES) and parameters (n, K) of what was seen.
     """
     u = coordinates[None]
     z = objective.at_rest(1)
@@ -111,26 +111,11 @@ def linearised(objective: Objective, coordinates: Array) -> tuple[Array, Array, 
         linear = objective.linearise(u, z)
     seen = _seen(objective)
     spread = linear.spread[0, 0][seen]
-    return linear.residual[0, 0][seen] + spread @ z[0, 0], spread, linear.slope[0, 0][seen], z
+    return linear.residual[0, 0][seen] + spread @ z[0, 0], spread, linear.slope[0, 0][seen]
 
 
 def _seen(objective: Objective) -> NDArray[np.bool_]:
     return np.asarray(objective.cuts.weight[0].reshape(-1) > 0.0)
-
-
-def _pushes(objective: Objective, u: Array, z: Array) -> Array:
-    """Return (3 KNOTS, n) how the poses over noise follow each knot of a wrench, for a newton."""
-    cuts, gyration = objective.cuts, objective.cuts.track.gyration
-    unit = np.array([1.0, 1.0, gyration])
-    told = cuts.told + np.einsum("wkl,wl->wk", cuts.root, z[0, :, :6])
-    count = 1 + 3 * KNOTS
-    extra = np.tile((z[0, :, 6:] * objective.floor * unit)[None, :, None, :], (count, 1, KNOTS, 1))
-    for k in range(3 * KNOTS):
-        extra[1 + k, :, k // 3, k % 3] += TEST_STEP * unit[k % 3]
-    rows = np.repeat(objective.hypothesis.rows(u), count, 0)
-    found = poses(rows, cuts, np.repeat(told[None], count, 0), extra)
-    moved = ((found[1:] - found[:1]) * cuts.weight / TEST_STEP).reshape(3 * KNOTS, -1)
-    return np.asarray(moved[:, _seen(objective)])
 
 
 def log_e_value(window: Window, noise: Noise, forces: tuple[float, ...]) -> float:

@@ -102,7 +102,7 @@ class Lasting:
             counts: False: learn only.
         """
         at = self._model.mean
-        residual, spread, slope, _ = linearised(Objective(self._hypothesis, cuts, floor), at)
+        residual, spread, slope = linearised(Objective(self._hypothesis, cuts, floor), at)
         lower = np.linalg.cholesky(np.eye(len(residual)) + spread @ spread.T)
         residual, slope = np.linalg.solve(lower, residual), np.linalg.solve(lower, slope)
         by_model, self._model = self._model.after(residual, slope, at, noise)

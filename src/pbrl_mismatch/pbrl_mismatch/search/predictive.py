@@ -1,14 +1,17 @@
 """Posterior predictive test of a model: whether there is a wrench in its windows that it does not have.
 
-In each window the model may add a wrench that is straight between three knots. Whitened by the noise, the unknown
-starts and the sensor's own error, and freed of all that the model's own parameters could do, the poses split into what
-such a wrench would explain (D numbers) and the rest (R numbers). If the model is right both are noise, and
+In each window a wrench may act that is straight between three knots. Whitened by the noise, the unknown starts and the
+sensor's own error, and freed of all that the model's own parameters could do, the poses split into what such a wrench
+would do to a body that nothing else holds (D numbers) and the rest (R numbers). If the model is right both are noise,
 
     F = (|explained|^2 / D) / (|rest|^2 / R)  ~  F(D, R):
 
 the noise is estimated in the same breath, so that a tag which is a little better or worse than thought is no mismatch.
 So is the size of the sensor's own error, up to what was told: with one that is larger than it is, the test would be
 blunt and its p-values too high.
+
+What the wrench would do in the model is no measure: a wheel that holds a body where a pin let it go would hold it
+against the wrench as well, and the whole misfit would pass for noise.
 """
 
 from __future__ import annotations
@@ -20,7 +23,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
-from pbrl_mismatch.data.simulation import poses
+from pbrl_mismatch.data.cuts import Cuts
+from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.search.climb import Peak
 from pbrl_mismatch.search.hypothesis import BELIEVED
 from pbrl_mismatch.search.objective import START, WRENCH
@@ -28,8 +32,7 @@ from pbrl_mismatch.search.objective import START, WRENCH
 Array = NDArray[np.float64]
 
 KNOTS = 3
-TEST_STEP = 0.3
-"""Finite difference in a knot's force [N]; times the radius of gyration for the torque."""
+"""A wrench is straight between the first, the middle and the last moment of a window."""
 TELLING = 0.05
 """A direction that one newton moves by less than this many standard deviations tells nothing."""
 FLOORS = (1.0, 0.6, 0.3, 0.1, 0.03)
@@ -71,6 +74,26 @@ def belief_conflict(peak: Peak, row: int) -> float:
     return float(chi2.sf(np.sum(off[held] ** 2), len(held))) if held else 1.0
 
 
+def pushed(cuts: Cuts, mass: float) -> Array:
+    """Return how a wrench that is straight between knots moves a body that nothing else holds.
+
+    Args:
+        cuts: W windows of N poses.
+        mass: of the body [kg].
+
+    Returns:
+        (W, 3 N, 3 KNOTS) poses over their noise; for each knot forces along x and y of one newton, and a torque of one
+        newton at the radius of gyration.
+    """
+    gyration, time = cuts.track.gyration, cuts.place * cuts.track.dt
+    half = 0.5 * cuts.track.dt * cuts.span[:, 1, None]
+    # Twice integrated: what falls from one to nothing at half the window, what rises to there and falls, what rises on.
+    rises, rises_on = time**3 / (6.0 * half), np.maximum(time - half, 0.0) ** 3 / (6.0 * half)
+    way = np.stack([0.5 * time**2 - rises + rises_on, rises - 2.0 * rises_on, rises_on], -1) / mass
+    moved = np.einsum("wnk,ij->wnikj", way, np.diag([1.0, 1.0, 1.0 / gyration])) * cuts.weight[..., None, None]
+    return np.asarray(moved.reshape(len(cuts), -1, 3 * KNOTS))
+
+
 def predictive_test(peak: Peak, row: int) -> Verdict:
     """Test a fitted model on the windows of its objective.
 
@@ -79,27 +102,17 @@ def predictive_test(peak: Peak, row: int) -> Verdict:
         row: which of its points.
     """
     objective = peak.objective
-    cuts, gyration = objective.cuts, objective.cuts.track.gyration
+    cuts = objective.cuts
     u, z = peak.coordinates[row : row + 1], peak.nuisance[row : row + 1]
     linear = objective.linearise(u, z)
-    told = cuts.told + np.einsum("wkl,wl->wk", cuts.root, z[0, :, :6])
-    scale = objective.floor * np.array([1.0, 1.0, gyration])
-    extra = np.tile((z[0, :, 6:] * scale)[:, None, :], (1 + 3 * KNOTS, 1, KNOTS, 1)).reshape(
-        1 + 3 * KNOTS, len(cuts), KNOTS, 3
-    )
-    unit = np.array([1.0, 1.0, gyration])
-    for k in range(3 * KNOTS):
-        extra[1 + k, :, k // 3, k % 3] += TEST_STEP * unit[k % 3]
-    rows = np.repeat(objective.hypothesis.rows(u), 1 + 3 * KNOTS, 0)
-    found = poses(rows, cuts, np.repeat(told[None], len(rows), 0), extra)
-    push = ((found[1:] - found[:1]) * cuts.weight / TEST_STEP).reshape(3 * KNOTS, len(cuts), -1)
+    push = pushed(cuts, float(objective.hypothesis.rows(u)[0, at.MASS]))
     windows = []
     for w in range(len(cuts)):
         seen = cuts.weight[w].reshape(-1) > 0.0
         spread = linear.spread[0, w][seen]
         # The residual that would be left with no nuisance, to first order; its covariance is I + S S^T.
         centred = linear.residual[0, w][seen] + spread @ z[0, w]
-        windows.append(_Window(centred, linear.slope[0, w][seen], spread, push[:, w][:, seen].T))
+        windows.append(_Window(centred, linear.slope[0, w][seen], spread, push[w][seen]))
     white = max((_whiten(windows, share) for share in FLOORS), key=lambda each: each.log_likelihood)
     verdict = _split(white)
     conflict = belief_conflict(peak, row)
