@@ -45,23 +45,27 @@ function zoomBox(object) {
   const mean = object.wheel.mean, reach = 1.25 * Math.max(0.02, object.wheel.radius95);
   const near = [...object.casters, ...(object.truth ? object.truth.locked : [])];
   const close = near.filter((p) => Math.hypot(p[0] - mean[0], p[1] - mean[1]) < Math.max(4 * reach, 0.08));
-  const size = Math.max(reach, ...close.map((p) => 1.3 * Math.max(Math.abs(p[0] - mean[0]), Math.abs(p[1] - mean[1]))));
+  const away = (p) => Math.max(Math.abs(p[0] - mean[0]), Math.abs(p[1] - mean[1]));
+  const size = Math.max(reach, ...close.map((p) => 1.3 * away(p)), ...object.wheel.ellipse.map((p) => 1.05 * away(p)));
   return [[mean[0] - 1.5 * size, mean[1] - size], [mean[0] + 1.5 * size, mean[1] + size]];
 }
 
 function drawZoom(svg, object) {
-  const width = 400, height = 270, corners = zoomBox(object);
-  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  // The caption has a strip of its own above what is drawn.
+  const width = 400, height = 270, strip = 26, corners = zoomBox(object);
+  svg.setAttribute("viewBox", `0 ${-strip} ${width} ${height + strip}`);
   const view = mapping(bounds(corners), width, height, 8);
   element(svg, "path", { class: "recorded body", d: path(object.footprint.map(view.map), true) });
   for (const point of object.casters) {
     const [x, y] = view.map(point);
     element(svg, "circle", { class: "caster", cx: x, cy: y, r: 8 });
-    if (x > 0 && x < width && y > 0 && y < height) element(svg, "text", { class: "halo", x: x + 13, y: y - 10 }, "caster");
   }
   cloud(svg, view, object.wheel, 2.4);
   truthMarks(svg, view, object, 15);
-  element(svg, "text", { class: "halo", x: 12, y: 20 }, "enlarged; cross: mean, line: 95 % region");
+  for (const [x, y] of object.casters.map(view.map)) {
+    if (x > 0 && x < width && y > 0 && y < height) element(svg, "text", { class: "halo", x: x + 13, y: y - 10 }, "caster");
+  }
+  element(svg, "text", { class: "halo", x: 12, y: 20 - strip }, "enlarged; cross: mean, line: 95 % region");
   scaleBar(svg, view);
 }
 
