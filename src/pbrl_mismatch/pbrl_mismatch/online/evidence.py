@@ -5,9 +5,10 @@ In a window the poses, over their noise and linearised, are
     r = S z + A d + B w + n,    z, d, n Gaussian,
 
 with the nuisances z of `search.objective` (the start, the sensor's own error), what is not known of the parameters, d,
-and a wrench w that is straight between three knots. Under the model w is nothing; otherwise each knot has forces of
-the order tau along each axis. With the scale of the noise known only from the windows before, both densities are of
-Student's form, and their ratio is the evidence. Its mean is one if the model is right, whatever came before.
+and a wrench w that is straight between three knots, B as it moves a body that nothing else holds. Under the model w is
+nothing; otherwise each knot has forces of the order tau along each axis. With the scale of the noise known only from
+the windows before, both densities are of Student's form, and their ratio is the evidence. Its mean is one if the model
+is right, whatever came before.
 """
 
 from __future__ import annotations
