@@ -35,9 +35,9 @@ WITH_SETS = ("concealed", "fuzz")
 """Benches whose cases come in sets."""
 WITH_MOST = (*WITH_SETS, "kills", "fence")
 """Benches whose cases can be counted."""
-WITH_MINUTES = (*WITH_MOST, "soak")
+WITH_MINUTES = (*WITH_MOST, "mismatch", "soak")
 """Benches that can end after a time."""
-WITH_CARRY = ("concealed", "kills", "fence")
+WITH_CARRY = ("concealed", "kills", "fence", "mismatch")
 """Benches of hours, whose cases can be done on one machine after another."""
 
 EXPERIMENTS = {
