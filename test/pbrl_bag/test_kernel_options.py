@@ -1,8 +1,11 @@
-"""A compiled leaf borrows arrays: it neither makes nor returns one, and calls only what does not either."""
+"""A compiled leaf borrows arrays, and calls only what does not make any either; threads that wait leave their core."""
 
 from __future__ import annotations
 
 import ast
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -49,3 +52,35 @@ def test_a_leaf_that_makes_an_array_does_not_compile() -> None:
 
     with pytest.raises(TypingError, match="No implementation of function"):
         made(3)
+
+
+ON_ALL_CORES = """
+from pbrl_bag import kernel_options
+from numba import njit, prange
+
+@njit(parallel=True)
+def count(most):
+    found = 0
+    for _ in prange(most):
+        found += 1
+    return found
+
+assert count(100) == 100
+"""
+
+
+@pytest.mark.parametrize(("told", "heard"), [({}, "PASSIVE"), ({"OMP_WAIT_POLICY": "active"}, "ACTIVE")])
+def test_threads_that_wait_leave_their_core_unless_told_otherwise(told: dict[str, str], heard: str) -> None:
+    clean = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"}
+    shown = {"NUMBA_THREADING_LAYER": "omp", "OMP_DISPLAY_ENV": "true", **told}
+    done = subprocess.run([sys.executable, "-c", ON_ALL_CORES], env=clean | shown, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert f"OMP_WAIT_POLICY = '{heard}'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in KERNELS if "prange" in path.read_text(encoding="utf-8")], ids=lambda path: path.name
+)
+def test_whoever_loops_on_all_cores_has_said_how_threads_wait(path: Path) -> None:
+    told = [node.module for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if hasattr(node, "module")]
+    assert "pbrl_bag.kernel_options" in told
