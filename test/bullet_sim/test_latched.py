@@ -18,11 +18,14 @@ HOLDS = 40
 SAYS = """
 import sys, time
 import rclpy
+from rclpy.duration import Duration
 from std_msgs.msg import String
-from bullet_sim.ros.latched import LatchedPublisher
+from bullet_sim.ros import latched
+if len(sys.argv) > 1:
+    latched.PATIENCE = Duration(seconds=float(sys.argv[1]))
 rclpy.init()
 node = rclpy.create_node("says")
-word = LatchedPublisher(node, String, "/word")
+word = latched.LatchedPublisher(node, String, "/word")
 streams = [node.create_publisher(String, f"stream_{number}", 100) for number in range(10)]
 count = node.count_subscribers
 while not all(count(topic) for topic in ("/word", *(stream.topic_name for stream in streams))):
@@ -39,6 +42,8 @@ for line in sys.stdin:
 for _ in range(2):  # the second waits for the first
     word.publish(String(data="over"))
 """
+FOREVER = "30.0"
+"""Patience [s] with a listener that gets no core for a while: on a busy machine that is longer than 0.1 s."""
 HEARS = """
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -71,7 +76,9 @@ def test_both_ends_of_each_hold_arrive_though_a_socket_overflows(environment: di
     python = [sys.executable, "-c"]
     with (
         subprocess.Popen([*python, HEARS], env=environment, stdout=subprocess.PIPE, text=True) as hears,
-        subprocess.Popen([*python, SAYS], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as says,
+        subprocess.Popen(
+            [*python, SAYS, FOREVER], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        ) as says,
     ):
         try:
             says.communicate("".join(f"{number}\n" for number in range(HOLDS)).encode(), timeout=60)
