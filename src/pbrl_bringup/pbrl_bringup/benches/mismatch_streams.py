@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -31,6 +32,8 @@ from pbrl_mismatch.online.slices import between
 from pbrl_model.errors import ModelError
 from pbrl_model.fitting.fit import fit_recording
 from pbrl_model.posterior import Posterior
+
+Outcome = TypeVar("Outcome", "Clean", "Late")
 
 CHUNK = 2
 """Pushes of one simulation."""
@@ -75,26 +78,24 @@ class Late:
 
 def clean_stream(seed: int, seconds: float, folder: Path, until: float | None = None) -> Clean | None:
     """Watch a clean stream, or read what was kept of it; None where it is past the time [s] to begin one."""
-    path, told = folder / f"{seed}.json", {"seed": seed, "seconds": seconds}
-    kept = read_run(Clean, path, told)
-    if kept is None and _in_time(until):
-        kept = watch_clean(seed, seconds)
-        keep_run(path, told, kept)
-    return kept
+    told = {"seed": seed, "seconds": seconds}
+    return _once(Clean, folder / f"{seed}.json", told, until, lambda: watch_clean(seed, seconds))
 
 
 def concealed_stream(effect: str, seed: int, folder: Path, until: float | None = None) -> Late | None:
     """Watch a stream with an effect, or read what was kept of it; None where it is past the time [s] to begin one."""
-    path, told = folder / f"{effect}-{seed}.json", {"effect": effect, "seed": seed}
-    kept = read_run(Late, path, told)
-    if kept is None and _in_time(until):
-        kept = watch_effect(effect, seed)
+    told = {"effect": effect, "seed": seed}
+    return _once(Late, folder / f"{effect}-{seed}.json", told, until, lambda: watch_effect(effect, seed))
+
+
+def _once(
+    kind: type[Outcome], path: Path, told: Mapping[str, Any], until: float | None, watch: Callable[[], Outcome]
+) -> Outcome | None:
+    kept = read_run(kind, path, told)
+    if kept is None and (until is None or time.time() < until):
+        kept = watch()
         keep_run(path, told, kept)
     return kept
-
-
-def _in_time(until: float | None) -> bool:
-    return until is None or time.time() < until
 
 
 def watch_clean(seed: int, seconds: float) -> Clean:
