@@ -252,6 +252,7 @@ def _predicted(
             track["outline"],
             track["feet"],
             place,
+            np.ones((1, 1), dtype=np.bool_),
             out,
         )
         found = out[0, 0]

@@ -18,7 +18,7 @@ from pbrl_mismatch.search.fitted import Fitted, alone, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.objective import NUISANCES, Objective
-from pbrl_mismatch.search.posterior import Density, evolved, with_draws
+from pbrl_mismatch.search.posterior import KEPT, POPULATION, Density, evolved, with_draws
 
 FLOOR = 0.15
 
@@ -48,6 +48,7 @@ def test_they_are_laplace_s_where_the_density_is_gaussian(track: Any, free: Any)
     rng = np.random.default_rng(0)
     peak = alone(climb(told(rng, track, free, free.mean[None]), free.mean[None], iterations=8))
     draws, deviation = evolved(rng, peak), np.sqrt(np.diag(peak.covariance(0)))
+    assert len(draws) == POPULATION * KEPT
     assert np.all(np.abs(draws.mean(axis=0) - peak.coordinates[0]) < 0.3 * deviation)
     assert draws.std(axis=0) == pytest.approx(deviation, rel=0.25)
 

@@ -11,7 +11,7 @@ import pytest
 
 from pbrl_mismatch import EFFECTS, DiagnoseOptions
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.weigh import weigh
+from pbrl_mismatch.search.weigh import CLEAR, weigh
 
 OPTIONS = DiagnoseOptions()
 
@@ -71,8 +71,8 @@ def test_one_effect_more_takes_more_than_a_wrong_law_leaves(unexplained: float) 
         )
         return found["floor_slope", "tether"] - found["tether",]
 
-    # Of two that were tried, one; a twenty-fifth of what the first explains of the motion; and what both leave.
-    assert gained(200.0) == pytest.approx(200.0 - math.log(2.0) - 0.04 * 1000.0 - unexplained)
+    # Of two that were tried, one; a twenty-fifth of what the first explains; what both leave; and clearly.
+    assert gained(200.0) == pytest.approx(200.0 - math.log(2.0) - 0.04 * 1000.0 - unexplained - CLEAR)
     assert gained(300.0) - gained(200.0) == pytest.approx(100.0)
 
 

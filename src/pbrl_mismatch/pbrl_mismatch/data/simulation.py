@@ -12,10 +12,17 @@ from pbrl_mismatch.kernels.motion_kernel import simulate_parallel, simulate_seri
 from pbrl_model.rollout import KERNEL_LOCK, plain
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 def poses(
-    rows: Array, cuts: Cuts, told: Array | None = None, extra: Array | None = None, *, parallel: bool = False
+    rows: Array,
+    cuts: Cuts,
+    told: Array | None = None,
+    extra: Array | None = None,
+    asked: Mask | None = None,
+    *,
+    parallel: bool = False,
 ) -> Array:
     """Simulate every row over every window.
 
@@ -24,10 +31,11 @@ def poses(
         cuts: W windows.
         told: (P, W, 6) start states; None: as smoothed.
         extra: (P, W, K, 3) added wrench in the body's axes, straight between K knots [N, N, N m]; None: none.
+        asked: (P, W) which windows of which rows are simulated; None: all.
         parallel: on all cores; otherwise on this one, and other threads may simulate beside it. The bytes are the same.
 
     Returns:
-        (P, W, N, 3) poses of the body's frame as tags would see it.
+        (P, W, N, 3) poses of the body's frame as tags would see it; zero where they were not asked.
 
     Raises:
         MismatchError: a shape does not fit.
@@ -40,7 +48,7 @@ def poses(
         raise MismatchError(f"simulation: expected starts of shape {(count, windows, 6)}, got {starts.shape}")
     added = np.zeros((1, 1, 1, 3)) if extra is None else extra
     track = cuts.track
-    out = np.empty((count, *cuts.place.shape, 3))
+    out = np.zeros((count, *cuts.place.shape, 3))
     arguments = (
         plain(rows),
         plain(starts),
@@ -55,6 +63,7 @@ def poses(
         track.outline,
         track.feet,
         cuts.place,
+        np.ones((count, windows), dtype=np.bool_) if asked is None else asked,
         out,
     )
     if parallel:

@@ -23,6 +23,7 @@ from pbrl_model.kernel import cos_sin
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 FIRST, STEPS, BEGIN, LAST = 0, 1, 2, 3
 """Columns of a window's whole numbers: first step, how many, first and last step of its episode."""
@@ -177,6 +178,7 @@ def simulate_serial(
     outline: Array,
     feet: Array,
     place: Array,
+    asked: Mask,
     out: Array,
 ) -> None:
     """Simulate every parameter row over every window, on this core; other threads may do the same beside it.
@@ -196,13 +198,18 @@ def simulate_serial(
         outline: (E, 2) footprint [m], counter-clockwise.
         feet: (F, 2) points that carry the load [m].
         place: (W, N) where each recorded pose lies, in steps from the window's start, in order.
-        out: (P, W, N, 3) poses of the body's frame as tags would see it, written.
+        asked: (P, W) which are simulated.
+        out: (P, W, N, 3) poses of the body's frame as tags would see it, written where they are asked.
     """
     windows, com, memory = span.shape[0], np.empty(2), np.empty((span.shape[0], STATE))
     for r in range(rows.shape[0]):
+        if not asked[r].any():
+            continue
         _, _ = load_now(rows[r], clock[0], body, com)
         rehearse_windows(rows[r], seen, span, body, outline, feet, com, memory)
         for w in range(windows):
+            if not asked[r, w]:
+                continue
             simulate_window(
                 rows[r],
                 told[r, w],
@@ -237,6 +244,7 @@ def simulate_parallel(
     outline: Array,
     feet: Array,
     place: Array,
+    asked: Mask,
     out: Array,
 ) -> None:
     """Do what `simulate_serial` does on all cores; each row is its own work, so the bytes are the same."""
@@ -245,6 +253,8 @@ def simulate_parallel(
         _, _ = load_now(rows[r], clock[0], body, com)
         rehearse_windows(rows[r], seen, span, body, outline, feet, com, memory)
         for w in range(span.shape[0]):
+            if not asked[r, w]:
+                continue
             simulate_window(
                 rows[r],
                 told[r, w],

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_mismatch.search.objective import Objective, Reduced, nuisance_step, reduce
+from pbrl_mismatch.search.objective import NUISANCES, Objective, Reduced, nuisance_step, reduce
 from pbrl_mismatch.search.quiet import Holding, of_little
 
 Array = NDArray[np.float64]
@@ -22,8 +22,13 @@ FRESH = 2
 """Slopes in the nuisances are taken anew every so many steps."""
 SETTLED = 0.02
 """A gain below this [nat] of all starts ends the climb."""
+PROMISED = 2e-3
+"""A step of one window's nuisances is not tried where it would lower the misfit by less, were all linear."""
 PATIENCE = 2
 """A start that gains less than that in so many steps one after the other is left where it is."""
+OUTRUN, FADES = 10.0, 0.3
+"""So is one that is behind the best by more than so many times what its last step gained; a step that failed leaves so
+much of what was hoped for."""
 
 
 @dataclass(frozen=True)
@@ -72,14 +77,13 @@ class Peak:
 
     def take(self, rows: NDArray[np.int64]) -> Peak:
         """Return some of the points."""
-        r = self.reduced
         return Peak(
             self.objective,
             self.coordinates[rows],
             self.nuisance[rows],
             self.misfit[rows],
             self.weight[rows],
-            Reduced(r.matrix[rows], r.vector[rows], r.gain[rows], r.shift[rows], r.log_det[rows]),
+            self.reduced.take(rows),
             self.evidence[rows],
             self.settled[rows],
         )
@@ -118,32 +122,24 @@ def climb(
         rough: keep the slopes in the nuisances from the start to the end; else they are taken anew for the evidence.
         spread: (P, W, R, NUISANCES) slopes in the nuisances to begin with; None: taken at the starts.
     """
-    u = objective.hypothesis.believable(coordinates)
-    walk = _Walk(
-        u,
-        objective.at_rest(len(u)) if nuisance is None else nuisance.copy(),
-        np.full(len(u), FIRST_DAMPING),
-        np.full(len(u), math.inf),
-        Holding(len(u), objective.hypothesis.spread**-2.0),
-    )
-    idle = np.zeros(len(u), dtype=np.int64)
+    walk = _begun(objective, coordinates, nuisance, spread)
+    idle = np.zeros(len(coordinates), dtype=np.int64)
     stale = 0 if spread is None else 1
-    slopes = None if spread is None else spread.copy()
     for iteration in range(iterations):
-        on = np.flatnonzero(idle < PATIENCE)
+        on = np.flatnonzero((idle < PATIENCE) & (walk.behind <= OUTRUN * walk.hope))
         if len(on) == 0:
             break
         # How the start and a steady wrench move the poses hardly depends on what acts besides.
         fresh = (iteration + stale) % FRESH == 0
-        linear = objective.linearise(walk.u[on], walk.z[on], None if fresh or slopes is None else slopes[on])
-        slopes = _kept(slopes, on, linear.spread)
-        walk.z[on], residual, misfit = settled(objective, walk.u[on], walk.z[on], linear.spread, linear.residual)
+        # Where no step has gained, all is as it was: the next ones are shorter.
+        _linearise(objective, walk, on if fresh else on[walk.gained[on] > 0.0], fresh=fresh)
         walk.gained[on] = 0.0
-        _step(objective, walk, on, reduce(replace(linear, residual=residual), walk.z[on]), misfit, slopes)
+        _step(objective, walk, on)
+        walk.hope[on] = np.where(walk.gained[on] > 0.0, walk.gained[on], FADES * walk.hope[on])
         idle[on] = np.where(walk.gained[on] < SETTLED, idle[on] + 1, 0)
         if np.all(walk.gained < SETTLED):
             break
-    linear = objective.linearise(walk.u, walk.z, slopes if rough else None)
+    linear = objective.linearise(walk.u, walk.z, walk.slopes if rough else None)
     reduced = reduce(linear, walk.z)
     misfit = objective.misfit(linear.residual, walk.z)
     evidence = log_evidence(objective, walk.u, misfit, reduced)
@@ -160,32 +156,74 @@ class _Walk:
         z: (P, W, NUISANCES) nuisances.
         damping: (P,) of the next step.
         gained: (P,) by the last step [nat].
+        hope: (P,) what the next one may gain [nat].
+        cost: (P,) minus twice the log posterior where they are, at the best scales.
         holding: which starts step without what the data say nothing of.
+        slopes: (P, W, R, NUISANCES) in the nuisances, as they were last taken.
+        reduced: normal equations of the last linearisation.
+        misfit: (P, W) there.
     """
 
     u: Array
     z: Array
     damping: Array
     gained: Array
+    hope: Array
+    cost: Array
     holding: Holding
+    slopes: Array
+    reduced: Reduced
+    misfit: Array
+
+    @property
+    def behind(self) -> Array:
+        """Return (P,) how much less likely they are than the likeliest of them [nat]."""
+        return 0.5 * (self.cost - self.cost.min())
 
 
-def _step(
-    objective: Objective, walk: _Walk, on: NDArray[np.int64], reduced: Reduced, misfit: Array, slopes: Array
-) -> None:
+def _begun(objective: Objective, coordinates: Array, nuisance: Array | None, spread: Array | None) -> _Walk:
+    """Return a climb's starts; what is not yet known of them is written before it is read. Arguments as of `climb`."""
+    u = objective.hypothesis.believable(coordinates)
+    z = objective.at_rest(len(u)) if nuisance is None else nuisance.copy()
+    count, windows, free = len(u), z.shape[1], u.shape[1]
+    return _Walk(
+        u,
+        z,
+        np.full(count, FIRST_DAMPING),
+        np.full(count, math.inf),
+        np.full(count, math.inf),
+        np.zeros(count),
+        Holding(count, objective.hypothesis.spread**-2.0),
+        np.empty((count, windows, objective.cuts.weight[0].size, NUISANCES)) if spread is None else spread.copy(),
+        Reduced.room(count, windows, free),
+        np.empty((count, windows)),
+    )
+
+
+def _linearise(objective: Objective, walk: _Walk, rows: NDArray[np.int64], *, fresh: bool) -> None:
+    """Settle and linearise some starts where they are, with slopes in the nuisances taken anew or as they were."""
+    if len(rows) == 0:
+        return
+    linear = objective.linearise(walk.u[rows], walk.z[rows], None if fresh else walk.slopes[rows])
+    walk.slopes[rows] = linear.spread
+    walk.z[rows], residual, walk.misfit[rows] = settled(
+        objective, walk.u[rows], walk.z[rows], linear.spread, linear.residual
+    )
+    walk.reduced.put(rows, reduce(replace(linear, residual=residual), walk.z[rows]))
+
+
+def _step(objective: Objective, walk: _Walk, on: NDArray[np.int64]) -> None:
     """Move starts by a step that gains, a shorter one where the first does not; where none does, leave them.
 
     Args:
         objective: see `climb`.
         walk: changed.
-        on: which starts.
-        reduced: normal equations of those.
-        misfit: (len(on), W) there.
-        slopes: (P, W, R, NUISANCES) in the nuisances, of all starts.
+        on: which starts, as they were linearised.
     """
     hypothesis, prior_precision = objective.hypothesis, objective.hypothesis.spread**-2.0
-    cost, most = _cost(objective, walk.u[on], misfit), 3.0 * hypothesis.spread
-    matrix, vector = reduced.weighed(objective.weights(misfit))
+    walk.cost[on], most = _cost(objective, walk.u[on], walk.misfit[on]), 3.0 * hypothesis.spread
+    reduced = walk.reduced.take(on)
+    matrix, vector = reduced.weighed(objective.weights(walk.misfit[on]))
     curvature, quiet = matrix + np.diag(prior_precision), of_little(matrix, prior_precision)
     pull = vector - (walk.u[on] - hypothesis.mean) * prior_precision
     open_rows = np.arange(len(on))
@@ -198,12 +236,13 @@ def _step(
         step = hypothesis.believable(walk.u[now] + step) - walk.u[now]
         shift = reduced.shift[open_rows] - (reduced.gain[open_rows] @ step[:, None, :, None])[..., 0]
         trial_u, trial_z = walk.u[now] + step, walk.z[now] + shift
-        trial_z, _, found = settled(objective, trial_u, trial_z, slopes[now])
+        trial_z, _, found = settled(objective, trial_u, trial_z, walk.slopes[now])
         trial = _cost(objective, trial_u, found)
-        better = trial < cost[open_rows]
+        better = trial < walk.cost[now]
         rows = now[better]
         walk.u[rows], walk.z[rows] = trial_u[better], trial_z[better]
-        walk.gained[rows] = 0.5 * (cost[open_rows[better]] - trial[better])
+        walk.gained[rows] = 0.5 * (walk.cost[rows] - trial[better])
+        walk.cost[rows] = trial[better]
         walk.damping[rows] = np.maximum(walk.damping[rows] * EASIER, LEAST_DAMPING)
         walk.holding.stepped(rows, walk.gained[rows])
         open_rows, now = open_rows[~better], now[~better]
@@ -215,37 +254,47 @@ def _step(
 
 
 def settled(
-    objective: Objective, coordinates: Array, nuisance: Array, spread: Array, residual: Array | None = None
+    objective: Objective,
+    coordinates: Array,
+    nuisance: Array,
+    spread: Array,
+    residual: Array | None = None,
+    rounds: int = ROUNDS,
 ) -> tuple[Array, Array, Array]:
     """Move the nuisances alone, each window's as long as it gains; return them, residuals and misfits (P, W).
 
     Where feet stick or let go, a step in everything at once lands beside the valley's floor, where the cost says
     nothing of the coordinates.
+
+    Args:
+        objective: hypothesis and windows.
+        coordinates: (P, K).
+        nuisance: (P, W, NUISANCES) to begin with.
+        spread: (P, W, R, NUISANCES) slopes in the nuisances; one point's may stand for all.
+        residual: (P, W, R) there, if it is known.
+        rounds: steps of each window at most.
     """
-    if residual is None:
-        residual = objective.residual(coordinates, nuisance)
-    z, here = nuisance, objective.misfit(residual, nuisance)
-    share = np.ones(here.shape)
-    for _ in range(ROUNDS):
-        trial = z + share[..., None] * nuisance_step(spread, residual, z)
-        found = objective.residual(coordinates, trial)
-        there = objective.misfit(found, trial)
-        better = there < here
-        z, residual = np.where(better[..., None], trial, z), np.where(better[..., None], found, residual)
-        gained = float(np.max(np.where(better, here - there, 0.0), initial=0.0))
-        here = np.minimum(here, there)
-        share = np.where(better, 1.0, SHORTER * share)
-        if gained < SETTLED:
+    residual = objective.residual(coordinates, nuisance) if residual is None else residual.copy()
+    spread = np.broadcast_to(spread, (*residual.shape, NUISANCES))
+    z, here = nuisance.copy(), objective.misfit(residual, nuisance)
+    share, going = np.ones(here.shape), np.ones(here.shape, dtype=np.bool_)
+    for _ in range(rounds):
+        step, promised = nuisance_step(spread[going], residual[going], z[going])
+        worth = promised * share[going] * (2.0 - share[going]) > PROMISED
+        going[going] = worth
+        if not going.any():
             break
+        trial = z.copy()
+        trial[going] += share[going, None] * step[worth]
+        found = objective.residual_of(going, coordinates, trial)
+        there = objective.misfit(found, trial[going])
+        gained = here[going] - there
+        better = going.copy()
+        better[going] = gained > 0.0
+        z[better], residual[better], here[better] = trial[better], found[gained > 0.0], there[gained > 0.0]
+        share[going] = np.where(gained > 0.0, 1.0, SHORTER * share[going])
+        going[going] = (gained <= 0.0) | (gained > SETTLED)
     return z, residual, here
-
-
-def _kept(known: Array | None, rows: NDArray[np.int64], found: Array) -> Array:
-    """Return what is known of all starts with some rows as they were found; at first all are."""
-    if known is None:
-        return found
-    known[rows] = found
-    return known
 
 
 def _diagonal(matrices: Array) -> Array:

@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 
 POLISHED, POLISHED_OF_SETS, LONGER = 5, 3, 2
 """So many of the likeliest effects, and of the likeliest sets, are climbed on, for so many times the usual steps."""
-TRIED_OUT, GO_ON = 4, 4
-"""Steps that every start of a climb on has, and how many starts go on from there."""
+TRIED_OUT, GO_ON, BEHIND = 4, 4, 50.0
+"""Steps that every start of a climb on has, how many starts go on from there, and how far behind the best [nat]."""
 EXPLAINS = 10.0
 """What is likelier than the baseline by more explains something [nat]."""
 LEADS = 3
@@ -89,7 +89,7 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
     """Return a hypothesis climbed on from where it is, and from where another has the body's own parameters."""
     objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
     first = climb(objective, *starts_from(fitted, best), iterations=TRIED_OUT, rough=True)
-    order = first.ranked
+    order = first.ranked[first.evidence[first.ranked] >= first.evidence[first.best] - BEHIND]
     likely = first.take(order[apart_rows(first.coordinates[order], fitted.hypothesis.spread, GO_ON)])
     more = LONGER * options.iterations[-1] - TRIED_OUT
     peak = climb(objective, likely.coordinates, likely.nuisance, iterations=more)

@@ -29,9 +29,6 @@ GROUNDS_OF_SETS, OF_THE_BEST = 3, 0.3
 that act, the likeliest is often a third that stands in for both. Each explains at least this share of what it does."""
 FEWER = {"shortlist": 6, "candidates": 2, "keep": (1, 1)}
 """What is looked at where an effect is laid on another: the ground is nearly right."""
-WORTH_A_SET = 3.0
-"""Where the likeliest explains all that the test against any wrench sees, one effect more is looked into where along
-the path it is worth by this more than its prior costs [nat]."""
 WORTH_A_KIND = 3.0
 """A kind of baseline with more parameters is worth a search of its own where it is better by this [nat]."""
 
@@ -101,7 +98,8 @@ def explain(
         if not lacks:
             if len(stages.fitted) < len(options.windows):
                 break  # What is weighed are shorter windows than the path's.
-            least = worth_of_another(weighed) + WORTH_A_SET
+            # All that the test sees is explained: one effect more is looked into where along the path it is worth it.
+            least = worth_of_another(weighed)
         deepest = _grounds_of_sets(weighed, depth, track, lacks)
         fewer = options.model_copy(update=FEWER)
         more = _tried(seeds[depth], track, deepest, stages, grip, fewer, least)

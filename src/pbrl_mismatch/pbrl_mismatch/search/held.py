@@ -21,8 +21,9 @@ from pbrl_mismatch.search.path.starts import drawn
 
 Array = NDArray[np.float64]
 
-CLIMBED, STEPS = 4, 4
-"""So many of the likeliest draws are climbed from, in so many steps."""
+LOOKED_INTO, CLIMBED, STEPS = 12, 4, 4
+"""So many draws, the likeliest after one step of the nuisances, are settled; so many of those are climbed from, in so
+many steps."""
 KEPT = 2
 """So many of them go on."""
 
@@ -60,8 +61,15 @@ def held_starts(
     # How the start and a steady wrench move the poses hardly depends on what acts besides.
     believed = base.hypothesis.as_believed(base.peak.coordinates[0])[None]
     slopes = Objective(base.hypothesis, shortest, options.sensor_floor).linearise(believed, objective.at_rest(1)).spread
-    nuisance, _, misfit = settled(objective, draws, objective.at_rest(len(draws)), slopes)
-    density = objective.likelihood(misfit) - 0.5 * objective.prior_misfit(draws)
-    best = np.argsort(-density, kind="stable")[:CLIMBED]
-    peak = climb(objective, draws[best], nuisance[best], iterations=STEPS, rough=True)
+    nuisance, residual, misfit = settled(objective, draws, objective.at_rest(len(draws)), slopes, rounds=1)
+    some = _likeliest(objective, draws, misfit, LOOKED_INTO)
+    nuisance, _, misfit = settled(objective, draws[some], nuisance[some], slopes, residual[some])
+    best = _likeliest(objective, draws[some], misfit, CLIMBED)
+    peak = climb(objective, draws[some][best], nuisance[best], iterations=STEPS, rough=True)
     return tops(peak, KEPT)
+
+
+def _likeliest(objective: Objective, draws: Array, misfit: Array, count: int) -> NDArray[np.int64]:
+    """Return the rows of so many draws (n, K) with misfits (n, W), likeliest first."""
+    density = objective.likelihood(misfit) - 0.5 * objective.prior_misfit(draws)
+    return np.argsort(-density, kind="stable")[:count]

@@ -23,6 +23,7 @@ from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 START, WRENCH = 6, 3
 NUISANCES = START + WRENCH
@@ -72,12 +73,12 @@ class Objective:
         """Return nuisances (count, W, NUISANCES) of zero."""
         return np.zeros((count, len(self.cuts), NUISANCES))
 
-    def _simulated(self, rows: Array, nuisance: Array) -> Array:
-        """Return (P, W, N, 3) simulated poses."""
+    def _simulated(self, rows: Array, nuisance: Array, asked: Mask | None = None) -> Array:
+        """Return (P, W, N, 3) simulated poses, of windows (P, W) that are asked."""
         track = self.cuts.track
         told = self.cuts.told + np.einsum("wkl,pwl->pwk", self.cuts.root, nuisance[..., :START])
         scale = self.floor * np.array([1.0, 1.0, track.gyration])
-        return poses(rows, self.cuts, told, (nuisance[..., START:] * scale)[:, :, None, :])
+        return poses(rows, self.cuts, told, (nuisance[..., START:] * scale)[:, :, None, :], asked)
 
     def _residual(self, found: Array) -> Array:
         difference = self.cuts.pose - found
@@ -95,6 +96,10 @@ class Objective:
         """
         return self._residual(self._simulated(self.hypothesis.rows(coordinates), nuisance))
 
+    def residual_of(self, asked: Mask, coordinates: Array, nuisance: Array) -> Array:
+        """Return (n, R) residuals as `residual` does, of the n windows (P, W) alone that are asked."""
+        return self._residual(self._simulated(self.hypothesis.rows(coordinates), nuisance, asked))[asked]
+
     @property
     def counts(self) -> Array:
         """Return (W,) how many numbers were observed in each window."""
@@ -102,7 +107,7 @@ class Objective:
 
     def misfit(self, residual: Array, nuisance: Array) -> Array:
         """Return (P, W) the data's part: squares of residuals and nuisances."""
-        return np.sum(residual**2, axis=2) + np.sum(nuisance**2, axis=2)
+        return np.sum(residual**2, axis=-1) + np.sum(nuisance**2, axis=-1)
 
     def weights(self, misfit: Array) -> Array:
         """Return (P, W) one over the square of each window's scale: its best one that is at least one."""
@@ -176,13 +181,42 @@ class Reduced:
         """Return matrix (P, K, K) and vector (P, K) with a weight (P, W) for each window."""
         return np.einsum("pw,pwkl->pkl", weight, self.matrix), np.einsum("pw,pwk->pk", weight, self.vector)
 
+    def take(self, rows: NDArray[np.int64]) -> Reduced:
+        """Return those of some points."""
+        return Reduced(self.matrix[rows], self.vector[rows], self.gain[rows], self.shift[rows], self.log_det[rows])
 
-def nuisance_step(spread: Array, residual: Array, nuisance: Array) -> Array:
-    """Return the step (P, W, NUISANCES) to the best nuisances for slopes (P, W, R, NUISANCES), coordinates kept."""
+    @classmethod
+    def room(cls, points: int, windows: int, free: int) -> Reduced:
+        """Return those of no point yet, to be put in."""
+        return cls(
+            np.empty((points, windows, free, free)),
+            np.empty((points, windows, free)),
+            np.empty((points, windows, NUISANCES, free)),
+            np.empty((points, windows, NUISANCES)),
+            np.empty(points),
+        )
+
+    def put(self, rows: NDArray[np.int64], other: Reduced) -> None:
+        """Write others in place of some points'."""
+        for name, value in vars(other).items():
+            getattr(self, name)[rows] = value
+
+
+def nuisance_step(spread: Array, residual: Array, nuisance: Array) -> tuple[Array, Array]:
+    """Step to the best nuisances, coordinates kept.
+
+    Args:
+        spread: (..., R, NUISANCES) slopes of windows.
+        residual: (..., R).
+        nuisance: (..., NUISANCES).
+
+    Returns:
+        The steps (..., NUISANCES), and by how much (...) the misfits would fall, were all linear.
+    """
     spread_t = np.swapaxes(spread, -1, -2)
     pull = (spread_t @ residual[..., None])[..., 0] - nuisance
     step = np.linalg.solve(spread_t @ spread + np.eye(NUISANCES), pull[..., None])[..., 0]
-    return np.asarray(step, dtype=np.float64)
+    return np.asarray(step, dtype=np.float64), np.sum(pull * step, axis=-1)
 
 
 def reduce(linear: Linear, nuisance: Array) -> Reduced:

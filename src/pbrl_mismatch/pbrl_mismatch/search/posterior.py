@@ -3,7 +3,7 @@
 When a load was put down may be all the same for a second, and a cord's anchor lie anywhere along it: there Laplace's
 deviations are those of the steepest place. Draws are by differential evolution (ter Braak 2006): each point of a
 population moves by the difference of two others, so that steps have the density's own shape. The population begins at
-Laplace's Gaussian, spreads in a flattened density, and is cooled.
+Laplace's Gaussian, spreads in a flattened density, and is cooled; where that Gaussian is right, it is left as it is.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ FLAT = 0.3
 """Power of the density that the population spreads in."""
 LEAP, JITTER = 0.1, 1e-3
 """Share of moves by a whole difference, from mode to mode; noise of a move, in Laplace's deviations."""
+EVEN = 0.5
+"""Where the log density less Laplace's, at its own draws, varies by less [nat], nothing is to be spread or cooled."""
 SHORTEST = 0.4
 """The least that a difference is scaled by, over the best scale of a Gaussian."""
 
@@ -88,9 +90,13 @@ def _evolved(rng: np.random.Generator, peak: Peak, hypothesis: Hypothesis, densi
     values, vectors = np.linalg.eigh(peak.covariance(0))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     jitter = JITTER * np.sqrt(np.sum(root**2, axis=1))
-    points = hypothesis.believable(peak.coordinates[0] + rng.standard_normal((POPULATION, size)) @ root.T)
+    normal = rng.standard_normal((POPULATION, size))
+    drawn = peak.coordinates[0] + normal @ root.T
+    points = hypothesis.believable(drawn)
     here = density(points)
-    cooled = [*np.full(HOT, FLAT), *np.geomspace(FLAT, 1.0, COOLING), *np.ones(KEPT)]
+    gaussian = np.array_equal(points, drawn) and float(np.std(here + 0.5 * np.sum(normal**2, axis=1))) < EVEN
+    cooled = [] if gaussian else [*np.full(HOT, FLAT), *np.geomspace(FLAT, 1.0, COOLING)]
+    cooled += [1.0] * KEPT
     kept = np.empty((len(cooled), POPULATION, size))
     half = POPULATION // 2
     for generation, power in enumerate(cooled):

@@ -18,6 +18,8 @@ VETO, VETO_SHARE = 8.0, 0.05
 evidence gained, is not named."""
 DISCREPANCY = 0.04
 """Share of what a law explains that its being wrong may leave for others to explain."""
+CLEAR = 3.0
+"""One effect more has to be likelier by more [nat], twenty to one: a small difference of evidence names nothing."""
 REFINED = 0.01
 """Share of what a law explains that a law of which it is a limit has to explain beyond it."""
 JUDGED = 3
@@ -50,9 +52,9 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
     part, also those that were given up on the way: an effect of many laws is no likelier for having had a bad one fewer
     left. So do the kinds of baseline that are left under it.
 
-    Several effects together have to explain more of the motion, beyond the best of their parts, than what a law that is
-    a little wrong leaves for any other to take: a share of what that part explains, and as much as the likeliest set of
-    so many leaves unexplained.
+    Several effects together have to explain clearly more of the motion, beyond the best of their parts, than what a
+    law that is a little wrong leaves for any other to take: a share of what that part explains, and as much as the
+    likeliest set of so many leaves unexplained.
 
     Args:
         bases: kinds of baseline, fitted.
@@ -74,7 +76,7 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
         if len(key) > 1:
             parts = [best[other] for other in groups if other and set(other) < set(key)]
             known = max((_of_motion(part) for part in parts), default=-math.inf)
-            weight -= DISCREPANCY * max(known - _of_motion(best[()]), 0.0) + left[len(key)]
+            weight -= DISCREPANCY * max(known - _of_motion(best[()]), 0.0) + left[len(key)] + CLEAR * (len(key) - 1)
         limits = [_evidence(best[other]) for other in _limits(key) if other in groups]
         weight -= REFINED * max(max(limits, default=none) - none, 0.0)
         entries.append(Weighed(key, best[key], weight, 0.0, False))
@@ -125,7 +127,7 @@ def worth_of_another(weighed: Sequence[Weighed]) -> float:
     """Return how much likelier one effect more must make the likeliest hypothesis to be likelier than it [nat]."""
     singles = max(sum(len(each.effects) == 1 for each in weighed), 1)
     none = max(each.fitted.of_motion for each in weighed if not each.effects)
-    return math.log(singles) + DISCREPANCY * max(weighed[0].fitted.of_motion - none, 0.0)
+    return math.log(singles) + DISCREPANCY * max(weighed[0].fitted.of_motion - none, 0.0) + CLEAR
 
 
 def veto(weighed: Sequence[Weighed], baseline: Fitted, judge: Callable[[Fitted], Fitted]) -> tuple[Weighed, ...]:

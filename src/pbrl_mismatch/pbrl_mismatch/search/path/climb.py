@@ -15,8 +15,9 @@ Array = NDArray[np.float64]
 
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-6, 1e6
 EASIER, HARDER = 0.2, 8.0
-SETTLED, STEEP = 0.05, 1e3
-"""A gain below this [nat] of all starts ends a climb, where each has been damped by more than that."""
+SETTLED, PATIENCE, STEEP = 0.05, 2, 1e3
+"""A start that gains less than this [nat] in so many steps is left where it is, and so is one that gains nothing where
+it is damped by more than that."""
 
 
 @dataclass(frozen=True)
@@ -98,31 +99,33 @@ def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations:
 
     residual, slope = linear(u)
     misfit = np.sum(residual**2, axis=2)
+    idle, on = np.zeros(count, dtype=np.int64), every
     for _ in range(iterations):
-        matrix, vector = normal(residual, slope, weights(along, misfit))
-        cost = -2.0 * likelihood(along, misfit) + prior(u)
+        matrix, vector = normal(residual[on], slope[on], weights(along, misfit[on]))
+        cost = -2.0 * likelihood(along, misfit[on]) + prior(u[on])
         curvature = matrix + np.diag(spread**-2.0)
-        pull = vector - (u - mean) / spread**2
+        pull = vector - (u[on] - mean) / spread**2
         diagonal = curvature * np.eye(free)
         quiet = of_little(matrix, spread**-2.0)
-        damped = curvature + damping[:, None, None] * diagonal + holding.added(every, quiet)
+        damped = curvature + damping[on, None, None] * diagonal + holding.added(on, quiet)
         step = np.linalg.solve(damped, pull[..., None])[..., 0]
         step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
-        step = hypothesis.believable(u + step) - u
-        there_residual, there_slope = linear(u + step)
+        trial = hypothesis.believable(u[on] + step)
+        there_residual, there_slope = linear(trial)
         there = np.sum(there_residual**2, axis=2)
-        gained = 0.5 * (cost - (-2.0 * likelihood(along, there) + prior(u + step)))
+        gained = 0.5 * (cost - (-2.0 * likelihood(along, there) + prior(trial)))
         better = gained > 0.0
-        u = np.where(better[:, None], u + step, u)
-        misfit = np.where(better[:, None], there, misfit)
-        residual = np.where(better[:, None, None], there_residual, residual)
-        slope = np.where(better[:, None, None, None], there_slope, slope)
+        moved, left = on[better], on[~better]
+        u[moved], misfit[moved] = trial[better], there[better]
+        residual[moved], slope[moved] = there_residual[better], there_slope[better]
         # First without what is quiet, and only then a shorter step.
-        shorter = holding.failed(every[~better], quiet[~better])
-        holding.stepped(every[better], gained[better])
-        damping[better], damping[shorter] = damping[better] * EASIER, damping[shorter] * HARDER
+        shorter = holding.failed(left, quiet[~better])
+        holding.stepped(moved, gained[better])
+        damping[moved], damping[shorter] = damping[moved] * EASIER, damping[shorter] * HARDER
         damping = np.clip(damping, LEAST_DAMPING, MOST_DAMPING)
-        if float(np.max(np.where(better, gained, 0.0))) < SETTLED and float(damping.min()) > STEEP:
+        idle[moved] = np.where(gained[better] < SETTLED, idle[moved] + 1, 0)
+        on = on[np.where(better, idle[on] < PATIENCE, damping[on] <= STEEP)]
+        if len(on) == 0:
             break
     matrix, _ = normal(residual, slope, weights(along, misfit))
     _, log_det = np.linalg.slogdet(matrix * np.outer(spread, spread) + np.eye(free))
