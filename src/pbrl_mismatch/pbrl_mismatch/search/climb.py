@@ -110,7 +110,6 @@ def climb(
     *,
     iterations: int = 12,
     rough: bool = False,
-    spread: Array | None = None,
 ) -> Peak:
     """Minimise from many starts.
 
@@ -120,24 +119,22 @@ def climb(
         nuisance: (P, W, NUISANCES) to begin with; None: at rest.
         iterations: linearisations at most.
         rough: keep the slopes in the nuisances from the start to the end; else they are taken anew for the evidence.
-        spread: (P, W, R, NUISANCES) slopes in the nuisances to begin with; None: taken at the starts.
     """
-    walk = _begun(objective, coordinates, nuisance, spread)
+    walk = _begun(objective, coordinates, nuisance)
     idle = np.zeros(len(coordinates), dtype=np.int64)
-    stale = 0 if spread is None else 1
     for iteration in range(iterations):
         on = np.flatnonzero((idle < PATIENCE) & (walk.behind <= OUTRUN * walk.hope))
         if len(on) == 0:
             break
         # How the start and a steady wrench move the poses hardly depends on what acts besides.
-        fresh = (iteration + stale) % FRESH == 0
+        fresh = iteration % FRESH == 0
         # Where no step has gained, all is as it was: the next ones are shorter.
         _linearise(objective, walk, on if fresh else on[walk.gained[on] > 0.0], fresh=fresh)
         walk.gained[on] = 0.0
         _step(objective, walk, on)
         walk.hope[on] = np.where(walk.gained[on] > 0.0, walk.gained[on], FADES * walk.hope[on])
         idle[on] = np.where(walk.gained[on] < SETTLED, idle[on] + 1, 0)
-        if np.all(walk.gained < SETTLED):
+        if np.all(walk.gained[on] < SETTLED):
             break
     linear = objective.linearise(walk.u, walk.z, walk.slopes if rough else None)
     reduced = reduce(linear, walk.z)
@@ -181,7 +178,7 @@ class _Walk:
         return 0.5 * (self.cost - self.cost.min())
 
 
-def _begun(objective: Objective, coordinates: Array, nuisance: Array | None, spread: Array | None) -> _Walk:
+def _begun(objective: Objective, coordinates: Array, nuisance: Array | None) -> _Walk:
     """Return a climb's starts; what is not yet known of them is written before it is read. Arguments as of `climb`."""
     u = objective.hypothesis.believable(coordinates)
     z = objective.at_rest(len(u)) if nuisance is None else nuisance.copy()
@@ -194,7 +191,7 @@ def _begun(objective: Objective, coordinates: Array, nuisance: Array | None, spr
         np.full(count, math.inf),
         np.zeros(count),
         Holding(count, objective.hypothesis.spread**-2.0),
-        np.empty((count, windows, objective.cuts.weight[0].size, NUISANCES)) if spread is None else spread.copy(),
+        np.empty((count, windows, objective.cuts.weight[0].size, NUISANCES)),
         Reduced.room(count, windows, free),
         np.empty((count, windows)),
     )
