@@ -89,7 +89,8 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
     """Return a hypothesis climbed on from where it is, and from where another has the body's own parameters."""
     objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
     first = climb(objective, *starts_from(fitted, best), iterations=TRIED_OUT, rough=True)
-    order = first.ranked[first.evidence[first.ranked] >= first.evidence[first.best] - BEHIND]
+    # Where no start has any evidence none is behind.
+    order = first.ranked[~(first.evidence[first.ranked] < first.evidence[first.best] - BEHIND)]
     likely = first.take(order[apart_rows(first.coordinates[order], fitted.hypothesis.spread, GO_ON)])
     more = LONGER * options.iterations[-1] - TRIED_OUT
     peak = climb(objective, likely.coordinates, likely.nuisance, iterations=more)
