@@ -32,8 +32,8 @@ LEADS = 3
 """So many of the likeliest effects lead a baseline to where they have the body's own parameters, and so many of the
 sets that explain most lead their parts."""
 LED = 100.0
-"""Kinds of baseline that are worse than the best by more [nat] are not led: no other top would do. Nor are effects
-tried on richer kinds than the best that are."""
+"""Kinds of baseline that are worse than the best by more [nat], simulated too, are not led: no other top would do. Nor
+are effects tried on richer kinds than the best that are."""
 FREEDOM = 1.0
 """An effect that says nothing is less likely than the baseline by about so much at least, for its freedom [nat]."""
 FAINT = 2.0
@@ -46,14 +46,22 @@ def led(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: Diagn
     Where bodies stick there are many tops. An effect that does nothing but lead to a better one explains nothing.
     """
     likely = likeliest_first(each for each in tried if GRASP_COMPLIANCE not in each.hypothesis.effects)[:LEADS]
-    best, climbed = max(base.evidence for base in bases), []
+    best, climbed = likeliest_first(bases)[0], []
     for base in bases:
         found = base
-        for each in likely if base.evidence > best - LED else []:
+        for each in likely if keeps_up(base, best) else []:
             # One that is no likelier for all its freedom has found no better top.
             found = _climbed_on(found, each, stages, options) if each.evidence > found.evidence - FREEDOM else found
         climbed.append(found)
     return likeliest_first(climbed)
+
+
+def keeps_up(base: Fitted, best: Fitted) -> bool:
+    """Tell whether a kind of baseline is about as likely as the best is, or likelier simulated.
+
+    Friction of a simple kind may stand in along the path for what is left out, and simulate badly.
+    """
+    return base.evidence > best.evidence - LED or base.simulated > best.simulated
 
 
 def polished(
@@ -94,7 +102,7 @@ def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseO
     likely = first.take(order[apart_rows(first.coordinates[order], fitted.hypothesis.spread, GO_ON)])
     more = LONGER * options.iterations[-1] - TRIED_OUT
     peak = climb(objective, likely.coordinates, likely.nuisance, iterations=more)
-    better = peak.evidence[peak.best] > fitted.peak.evidence[0]
+    better = peak.evidence[peak.best] > fitted.simulated
     found = replace(fitted, peak=alone(peak)) if better else fitted
     if found.traced is None or best.traced is None or not best.traced.evidence > found.traced.evidence:
         return found

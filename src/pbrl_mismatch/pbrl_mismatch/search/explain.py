@@ -13,7 +13,7 @@ from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_mismatch.search.climbed_on import LED, POLISHED_OF_SETS, led, parts_led, polished
+from pbrl_mismatch.search.climbed_on import POLISHED_OF_SETS, keeps_up, led, parts_led, polished
 from pbrl_mismatch.search.fitted import Fitted, Stages, judged, likeliest_first
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
 from pbrl_mismatch.search.hops import REACHED, hopped
@@ -183,6 +183,6 @@ def _grounds(bases: list[Fitted]) -> list[Fitted]:
     simplest = min(bases, key=lambda each: len(each.hypothesis.parameters))
     if bases[0].evidence <= simplest.evidence + WORTH_A_KIND:
         return [simplest]
-    least = len(bases[0].hypothesis.parameters), bases[0].evidence - LED
-    richer = [each for each in bases[1:] if len(each.hypothesis.parameters) > least[0] and each.evidence > least[1]]
+    parameters = len(bases[0].hypothesis.parameters)
+    richer = [each for each in bases[1:] if len(each.hypothesis.parameters) > parameters and keeps_up(each, bases[0])]
     return [simplest, bases[0], *richer]

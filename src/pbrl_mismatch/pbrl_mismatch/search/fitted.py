@@ -120,8 +120,12 @@ class Fitted:
     @property
     def of_motion(self) -> float:
         """Return the part of the log evidence that is not beside the motion [nat]."""
-        simulated = float(self.peak.evidence[0])
-        return simulated if self.traced is None else max(simulated, self.traced.evidence)
+        return self.simulated if self.traced is None else max(self.simulated, self.traced.evidence)
+
+    @property
+    def simulated(self) -> float:
+        """Return the log evidence of the motion over simulated windows [nat]."""
+        return float(self.peak.evidence[0])
 
     def over_shorter(self) -> Fitted:
         """Return this as it was over the next shorter windows, if that is known."""

@@ -200,7 +200,7 @@ def _with_simulated_ground(found: PathPeak, effect: Effect, base: Fitted) -> Arr
 
 def _path_above_simulation(base: Fitted) -> float:
     """Return how much likelier a hypothesis is along its path than simulated [nat]."""
-    return base.traced.evidence - float(base.peak.evidence[0]) if base.traced is not None else 0.0
+    return base.traced.evidence - base.simulated if base.traced is not None else 0.0
 
 
 def _same(name: str, base: Fitted, options: DiagnoseOptions) -> bool:
