@@ -17,7 +17,7 @@ from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import Peak, climb
 from pbrl_mismatch.search.heldout import Score, held_out_score
-from pbrl_mismatch.search.hypothesis import BELIEVED, OF_FRICTION, Hypothesis
+from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.along import lay_along
 from pbrl_mismatch.search.path.climb import climb_along
@@ -31,8 +31,6 @@ BASELINE_STARTS, BASELINE_STEPS, KEPT_OF_BASELINE = 20, 8, 4
 """A baseline is climbed along the path from so many starts, in so many steps; so many go on to windows."""
 WHOLE = 4
 """Steps from the best of the kept windows to that of all."""
-FELT = 0.1, 1.0
-"""Friction of a wheel over the body's weight that a baseline is climbed from, and the spread of its logarithm."""
 MOVING = 0.02
 """Slower than this [m/s] is not taken for the speed of a push."""
 
@@ -263,15 +261,7 @@ def fit_baseline(
 
 def _baseline_starts(rng: np.random.Generator, track: Track, hypothesis: Hypothesis) -> Array:
     """Return starts (n, K) of a baseline: draws of its prior, some with a wheel where the motion has an axle."""
-    starts = hypothesis.sample_prior(rng, BASELINE_STARTS)
-    columns = hypothesis.columns
-    for k, name in enumerate(columns):
-        if name in BELIEVED:
-            starts[:, k] = hypothesis.mean[k]
-        if name in OF_FRICTION:
-            # From friction that is too little to be felt nothing leads back.
-            drawn = (starts[:, k] - hypothesis.mean[k]) / hypothesis.spread[k]
-            starts[:, k] = math.log(FELT[0]) + FELT[1] * drawn
+    starts, columns = hypothesis.sample_felt(rng, BASELINE_STARTS), hypothesis.columns
     if "wheel_x" in columns:
         x, y = columns.index("wheel_x"), columns.index("wheel_y")
         com = track.body[1:3]

@@ -32,6 +32,8 @@ SHARE = 1e-2
 OF_A_WHEEL = 0.03, 2.0
 """Friction along an axis of a wheel over the body's weight, and the spread of its logarithm: from 0.0005, a good
 bearing under a quarter of the load, to 0.5, rubber that slides under most of it."""
+FELT = 0.1, 1.0
+"""Friction along an axis of a wheel over the body's weight that is climbed from, and the spread of its logarithm."""
 SMALL = {"m": 0.005, "s": 0.02, "rad": 0.01}
 """Finite differences at most: borders, edges in time and axes are no softer."""
 
@@ -123,6 +125,17 @@ class Hypothesis:
     def sample_prior(self, rng: np.random.Generator, count: int) -> Array:
         """Draw (count, K) coordinates."""
         return self.mean + self.spread * rng.standard_normal((count, len(self.parameters)))
+
+    def sample_felt(self, rng: np.random.Generator, count: int) -> Array:
+        """Draw (count, K) coordinates to climb from: the body as believed, a wheel's friction so that it is felt."""
+        draws = self.sample_prior(rng, count)
+        for k, column in enumerate(self.columns):
+            if column in BELIEVED:
+                draws[:, k] = self.mean[k]
+            if column in OF_FRICTION:
+                # From friction that is too little to be felt nothing leads back.
+                draws[:, k] = math.log(FELT[0]) + FELT[1] * (draws[:, k] - self.mean[k]) / self.spread[k]
+        return draws
 
     def with_effect(self, effect: Effect, scene: Scene, variant: int) -> Hypothesis:
         """Return this with one effect more; a column that both have is taken as the effect has it."""

@@ -26,7 +26,7 @@ from pbrl_mismatch.search.path.climb import PathPeak
 from pbrl_mismatch.search.path.ground import Ground, ground_of, traced
 from pbrl_mismatch.search.path.pins import may_be_pinned
 from pbrl_mismatch.search.path.starts import starts_of
-from pbrl_mismatch.search.second import KEPT, is_another, parted_starts
+from pbrl_mismatch.search.wheels import KEPT, holds_as_pin, is_another, parted_starts, pinned_starts
 
 Array = NDArray[np.float64]
 
@@ -95,6 +95,8 @@ def search_library(
             two = parted_starts(rng, found.hypothesis, base, stages.fitted[0], options)
             return found.hypothesis, np.concatenate([two, found.coordinates])
         starts = _with_simulated_ground(found, EFFECTS[name], base)
+        if holds_as_pin(name, base, longest.track):
+            starts = np.concatenate([pinned_starts(rng, found.hypothesis, base, stages.fitted[0], options), starts])
         if k in told:
             held = held_starts(rng, found.hypothesis, variant, base, ground, stages.fitted[0], options)
             starts = np.concatenate([held, starts])

@@ -51,18 +51,21 @@ def may_be_pinned(track: Track) -> bool:
     return moved < GIVE and float(np.hypot(*(place - track.seen[:, :2].mean(axis=0)))) < size
 
 
-def with_pins(rng: np.random.Generator, draws: Array, columns: tuple[int, int], track: Track) -> Array:
-    """Put the pin where the body turned in most of the draws (n, K).
+def with_pins(
+    rng: np.random.Generator, draws: Array, columns: tuple[int, int], track: Track, share: float = SHARE
+) -> Array:
+    """Put the pin where the body turned in a share of the draws (n, K).
 
     Args:
         rng: which draws, and how far off.
         draws: of a prior.
         columns: of the place.
         track: of the body.
+        share: of the draws; the others stay as they are.
     """
     if not may_be_pinned(track):
         return draws
     place, _ = fixed_place(track)
-    out, count = draws.copy(), int(SHARE * len(draws))
+    out, count = draws.copy(), int(share * len(draws))
     out[:count, list(columns)] = place + SCATTER * rng.standard_normal((count, 2))
     return out
