@@ -15,8 +15,9 @@ from pbrl_mismatch import DiagnoseOptions, track_of
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.search.fitted import Fitted, cut_stages, fit_from
 from pbrl_mismatch.search.grip import GripEvidence, GripLaw, beside_motion
+from pbrl_mismatch.search.grown import AS_GOOD, survivors
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.library import AS_GOOD, _survivors, of_every_shape, search_library
+from pbrl_mismatch.search.library import of_every_shape, search_library
 from pbrl_mismatch.search.weigh import CLEAR, DISCREPANCY, weigh, worth_of_another
 
 FEW = ("viscous_drag", "floor_slope", "wrench_bias")
@@ -89,8 +90,8 @@ def test_an_effect_that_says_nothing_is_hardly_less_likely_than_what_it_is_laid_
 def test_of_sets_that_go_on_each_counts_once_in_whatever_order_it_was_found() -> None:
     sets = [("tether", "detent"), ("detent", "tether"), ("tether", "floor_slope"), ("detent", "viscous_drag")]
     tried = [SimpleNamespace(effects=effects) for effects in sets]
-    assert _survivors(tried, [50.0, 49.0, 40.0, 30.0], 2, 0.0) == [0, 1, 2]
-    assert _survivors(tried, [50.0, 49.0 - AS_GOOD, 40.0, 30.0], 2, 0.0) == [0, 2], "the worse order is given up"
+    assert survivors(tried, [50.0, 49.0, 40.0, 30.0], 2, 0.0) == [0, 1, 2]
+    assert survivors(tried, [50.0, 49.0 - AS_GOOD, 40.0, 30.0], 2, 0.0) == [0, 2], "the worse order is given up"
 
 
 def test_a_contact_goes_on_in_every_shape_where_it_goes_on_at_all() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,12 +16,11 @@ from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_mismatch.search.climb import Peak, climb
-from pbrl_mismatch.search.fitted import Fitted, Stages, alone, tops
+from pbrl_mismatch.search.fitted import Fitted, Stages
 from pbrl_mismatch.search.grip import GripEvidence
+from pbrl_mismatch.search.grown import grown, likeliest, survivors
 from pbrl_mismatch.search.held import held_starts, holds
 from pbrl_mismatch.search.hypothesis import Hypothesis
-from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.climb import PathPeak
 from pbrl_mismatch.search.path.ground import Ground, ground_of, traced
 from pbrl_mismatch.search.path.pins import may_be_pinned
@@ -32,10 +31,8 @@ Array = NDArray[np.float64]
 
 IN_ANOTHER_CHANNEL = frozenset({"grasp_compliance"})
 """Effects that the motion of the body does not show where the wrist's force is known."""
-AS_GOOD = 40.0
-"""Variants of an effect that are worse than its best by more [nat] are given up."""
-CLOSE = (20.0, 10.0)
-"""Effects this near to the likeliest [nat] all go on: from the path to windows, and from those to longer ones."""
+CLOSE = 20.0
+"""Effects this near to the likeliest [nat] all go on from the path to windows."""
 RESTLESS = 1.12
 """Where no law needs less than this scale of the noise along the path, bodies stick: what holds or stops them is then
 simulated whatever the path says of it, and begins also where short simulations have it."""
@@ -73,97 +70,141 @@ def search_library(
         What was simulated to the end; nothing, where nothing is worth it.
     """
     longest = cut_windows(track, max(options.windows))
+    jobs = _jobs(seed, bases, longest, options)
+    with ThreadPoolExecutor(options.workers) as pool:
+        begun = list(pool.map(partial(_begun, options), jobs))
+        before_it = {id(job.base): _of_ground(job, grip) for job in jobs}
+        gained = [
+            likeliest(each.hypothesis, each, grip) - before_it[id(job.base)]
+            for each, job in zip(begun, jobs, strict=True)
+        ]
+        if max(gained, default=-math.inf) < least:
+            return []
+        # What a ground with effects, simulated, knows beyond its path, what is laid on it knows as well.
+        on_path = [
+            gain + (job.base.evidence if job.base.hypothesis.effects else before_it[id(job.base)])
+            for gain, job in zip(gained, jobs, strict=True)
+        ]
+        chosen = _chosen(jobs, begun, on_path, bases, track, options)
+        going = [(jobs[k], begun[k], k in chosen.held) for k in chosen.jobs]
+        running = list(pool.map(partial(_begun_simulated, stages.fitted[0], options), going))
+        # Short windows rank ways to part a wheel no better than the path does: several go on. Of what holds they tell.
+        kept = {
+            hypothesis.variant: KEPT
+            for k, (hypothesis, starts) in zip(chosen.jobs, running, strict=True)
+            if len(starts) > options.keep[0] and k not in chosen.held
+        }
+        leading = {begun[k].hypothesis.variant for k in chosen.leading} | set(kept)
+        done = grown(pool, running, stages, leading, kept, grip, options)
+        if len(stages.fitted) < len(options.windows):
+            return done  # What is weighed are shorter windows than the path's.
+        along = {each.hypothesis.variant: each.coordinates[0] for each in begun}
+        starts = [np.array([along[each.hypothesis.variant], each.peak.coordinates[0]]) for each in done]
+        return list(pool.map(partial(trace, longest, options), done, starts))
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One variant of an effect on one base.
+
+    Attributes:
+        name: of the effect.
+        variant: which of its sub-models.
+        base: what it is laid on.
+        ground: the same along its path.
+        seed: of its draws.
+    """
+
+    name: str
+    variant: int
+    base: Fitted
+    ground: Ground
+    seed: np.random.SeedSequence
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """Which jobs go on from the path to simulated windows, by their numbers.
+
+    Attributes:
+        jobs: all of them.
+        held: those that short simulations tell where to begin.
+        leading: those that are simulated to the end.
+    """
+
+    jobs: tuple[int, ...]
+    held: frozenset[int]
+    leading: frozenset[int]
+
+
+def _jobs(seed: np.random.SeedSequence, bases: Sequence[Fitted], longest: Cuts, options: DiagnoseOptions) -> list[_Job]:
+    """Return every variant of every effect on every base that can have it."""
     grounds = [ground_of(each.hypothesis, each.peak.coordinates[0], longest, options.sensor_floor) for each in bases]
     for ground in grounds:
-        _ = ground.climbed, ground.first, ground.fine, ground.believed
-    jobs = [
+        _ = ground.climbed, ground.first, ground.fine, ground.believed  # threads share them
+    found = [
         (name, variant, base, ground)
         for base, ground in zip(bases, grounds, strict=True)
         for name in options.effects
         if name not in base.hypothesis.effects and name not in IN_ANOTHER_CHANNEL and not _same(name, base, options)
         for variant in range(len(EFFECTS[name].variants))
     ]
-    seeds = seed.spawn(len(jobs))
+    return [_Job(*job, own) for job, own in zip(found, seed.spawn(len(found)), strict=True)]
 
-    def begin(k: int) -> PathPeak:
-        return starts_of(np.random.default_rng(seeds[k]), *jobs[k], options)
 
-    def begin_simulated(k: int) -> tuple[Hypothesis, Array]:
-        (name, variant, base, ground), found = jobs[k], begun[k]
-        rng = np.random.default_rng(seeds[k].spawn(1)[0])
-        if is_another(name, base):
-            two = parted_starts(rng, found.hypothesis, base, stages.fitted[0], options)
-            return found.hypothesis, np.concatenate([two, found.coordinates])
-        starts = _with_simulated_ground(found, EFFECTS[name], base)
-        if holds_as_pin(name, base, longest.track):
-            starts = np.concatenate([pinned_starts(rng, found.hypothesis, base, stages.fitted[0], options), starts])
-        if k in told:
-            held = held_starts(rng, found.hypothesis, variant, base, ground, stages.fitted[0], options)
-            starts = np.concatenate([held, starts])
-        return found.hypothesis, starts
+def _begun(options: DiagnoseOptions, job: _Job) -> PathPeak:
+    """Return where a job begins, climbed along the path."""
+    return starts_of(np.random.default_rng(job.seed), job.name, job.variant, job.base, job.ground, options)
 
-    with ThreadPoolExecutor(options.workers) as pool:
-        begun = list(pool.map(begin, range(len(jobs))))
-        laid = [each.hypothesis for each in begun]
-        before_it = {id(base): _of_ground(base, ground, grip) for base, ground in zip(bases, grounds, strict=True)}
-        gained = [
-            _likeliest(each.hypothesis, each, grip) - before_it[id(base)]
-            for each, (_, _, base, _) in zip(begun, jobs, strict=True)
-        ]
-        if max(gained, default=-math.inf) < least:
-            return []
-        # What a ground with effects, simulated, knows beyond its path, what is laid on it knows as well.
-        on_path = [
-            gain + (base.evidence if base.hypothesis.effects else before_it[id(base)])
-            for gain, (_, _, base, _) in zip(gained, jobs, strict=True)
-        ]
-        stands_in = any(_path_above_simulation(base) > UNTOLD for base in bases)
-        most = len(EFFECTS) if stands_in else options.shortlist
-        chosen = _survivors(laid, on_path, most, CLOSE[0])
-        restless = min(each.noise_scale for each in begun) > RESTLESS
-        if restless:
-            chosen = sorted({*chosen, *(k for k, (name, *_) in enumerate(jobs) if holds(name))})
-        asked = [k for k, (_, _, base, _) in enumerate(jobs) if base is bases[0] or not base.hypothesis.effects]
-        pins = [k for k in asked if EFFECTS[jobs[k][0]].pins and may_be_pinned(longest.track)]
-        # A pin is so stiff that a path a millimetre off says nothing of it; and the first of two wheels has taken on
-        # what both do, so that along its path the second has nothing to explain.
-        chosen = sorted({*chosen, *pins, *(k for k in asked if is_another(jobs[k][0], jobs[k][2]))})
-        chosen = of_every_shape([(name, id(base)) for name, _, base, _ in jobs], chosen)
-        told = {k for k in asked if restless and holds(jobs[k][0]) and not is_another(jobs[k][0], jobs[k][2])}
-        running = list(pool.map(begin_simulated, chosen))
-        # Short windows rank ways to part a wheel no better than the path does: several go on. Of what holds they tell.
-        kept = {
-            hypothesis.variant: KEPT
-            for k, (hypothesis, starts) in zip(chosen, running, strict=True)
-            if len(starts) > options.keep[0] and k not in told
-        }
-        first = _survivors(laid, on_path, LEADING, 0.0)
-        leading = {begun[k].hypothesis.variant for k in (*first, *pins)} | set(kept)
-        before: list[Peak | None] = [None] * len(running)
-        for stage in range(len(stages.fitted)):
-            rough = stage + 2 < len(stages.fitted)
-            climbed = partial(_climbed, stages.fitted[stage], options.iterations[stage], options, rough)
-            peaks = list(pool.map(climbed, running))
-            if stage + 1 == len(stages.fitted):
-                break
-            simulated = [_likeliest(each, peak, grip) for (each, _), peak in zip(running, peaks, strict=True)]
-            chosen = _survivors([each for each, _ in running], simulated, options.survivors[stage], CLOSE[1])
-            # What the path says of long windows, short ones cannot take back.
-            chosen = sorted({*chosen, *(k for k, (each, _) in enumerate(running) if each.variant in leading)})
-            before = [peaks[k] for k in chosen]
-            running = [
-                (each, tops(peaks[k], kept.get(each.variant, options.keep[stage + 1])))
-                for k, each in ((k, running[k][0]) for k in chosen)
-            ]
-        done = [
-            Fitted(job[0], alone(peak), None, None, None if shorter is None else alone(shorter))
-            for job, peak, shorter in zip(running, peaks, before, strict=True)
-        ]
-        if len(stages.fitted) < len(options.windows):
-            return done  # What is weighed are shorter windows than the path's.
-        along = {each.hypothesis.variant: each.coordinates[0] for each in begun}
-        starts = [np.array([along[each.hypothesis.variant], each.peak.coordinates[0]]) for each in done]
-        return list(pool.map(partial(trace, longest, options), done, starts))
+
+def _chosen(
+    jobs: Sequence[_Job],
+    begun: Sequence[PathPeak],
+    on_path: Sequence[float],
+    bases: Sequence[Fitted],
+    track: Track,
+    options: DiagnoseOptions,
+) -> _Chosen:
+    """Choose by what the path says (on_path, [nat]), and beside that what it says nothing of."""
+    laid = [each.hypothesis for each in begun]
+    stands_in = any(_path_above_simulation(base) > UNTOLD for base in bases)
+    chosen = set(survivors(laid, on_path, len(EFFECTS) if stands_in else options.shortlist, CLOSE))
+    restless = min((each.noise_scale for each in begun), default=1.0) > RESTLESS
+    if restless:
+        chosen |= {k for k, job in enumerate(jobs) if holds(job.name)}
+    asked = [k for k, job in enumerate(jobs) if job.base is bases[0] or not job.base.hypothesis.effects]
+    pins = {k for k in asked if EFFECTS[jobs[k].name].pins and may_be_pinned(track)}
+    another = {k for k in asked if is_another(jobs[k].name, jobs[k].base)}
+    # A pin is so stiff that a path a millimetre off says nothing of it; and the first of two wheels has taken on
+    # what both do, so that along its path the second has nothing to explain.
+    every = of_every_shape([(job.name, id(job.base)) for job in jobs], sorted(chosen | pins | another))
+    held = {k for k in asked if restless and holds(jobs[k].name)} - another
+    return _Chosen(tuple(every), frozenset(held), frozenset({*pins, *survivors(laid, on_path, LEADING, 0.0)}))
+
+
+def _begun_simulated(
+    shortest: Cuts, options: DiagnoseOptions, going: tuple[_Job, PathPeak, bool]
+) -> tuple[Hypothesis, Array]:
+    """Return a job with starts (n, K) for simulations: those along the path, and where it says little others before.
+
+    Args:
+        shortest: windows that a simulation can follow from a wrong place.
+        options: settings.
+        going: the job, where it begins along the path, and whether short simulations tell of it.
+    """
+    job, found, held = going
+    base, hypothesis = job.base, found.hypothesis
+    rng = np.random.default_rng(job.seed.spawn(1)[0])
+    if is_another(job.name, base):
+        two = parted_starts(rng, hypothesis, base, shortest, options)
+        return hypothesis, np.concatenate([two, found.coordinates])
+    starts = _with_simulated_ground(found, EFFECTS[job.name], base)
+    if holds_as_pin(job.name, base, shortest.track):
+        starts = np.concatenate([pinned_starts(rng, hypothesis, base, shortest, options), starts])
+    if held:
+        stopped = held_starts(rng, hypothesis, job.variant, base, job.ground, shortest, options)
+        starts = np.concatenate([stopped, starts])
+    return hypothesis, starts
 
 
 def trace(longest: Cuts, options: DiagnoseOptions, fitted: Fitted, starts: Array) -> Fitted:
@@ -211,39 +252,6 @@ def _same(name: str, base: Fitted, options: DiagnoseOptions) -> bool:
     return EFFECTS[name].second and bool(wheels) and "wheel_x" not in base.hypothesis.columns
 
 
-def _climbed(cuts: Cuts, iterations: int, options: DiagnoseOptions, rough: bool, job: tuple[Hypothesis, Array]) -> Peak:
-    return climb(Objective(job[0], cuts, options.sensor_floor), job[1], iterations=iterations, rough=rough)
-
-
-def _of_ground(base: Fitted, ground: Ground, grip: GripEvidence | None) -> float:
-    """Return the evidence of a ground along its path, with what the grippers' poses say of it [nat]."""
-    return ground.evidence + (base.beside if grip is not None else 0.0)
-
-
-def _likeliest(hypothesis: Hypothesis, peak: Peak | PathPeak, grip: GripEvidence | None) -> float:
-    """Return the evidence of the best point of a hypothesis, with what the grippers' poses say of it [nat]."""
-    evidence = np.nan_to_num(peak.evidence, nan=-np.inf)
-    if grip is not None and np.isfinite(evidence).any():
-        points = [int(k) for k in np.flatnonzero(np.isfinite(evidence))]
-        evidence[points] += [grip.beside(hypothesis, peak.coordinates[k], peak.covariance(k)) for k in points]
-    return float(evidence.max())
-
-
-def _survivors(hypotheses: Sequence[Hypothesis], evidence: Sequence[float], most: int, close: float) -> list[int]:
-    """Return which hypotheses go on: the likeliest of each of so many effects, and others that are as good.
-
-    Args:
-        hypotheses: those that are tried.
-        evidence: of each of them [nat].
-        most: so many effects go on.
-        close: others go on that are this near to the likeliest [nat].
-    """
-    best: dict[tuple[str, ...], float] = {}
-    # Two effects are the same two in either order.
-    names = [tuple(sorted(each.effects)) for each in hypotheses]
-    for effects, value in zip(names, evidence, strict=True):
-        best[effects] = max(best.get(effects, -np.inf), value)
-    ranked = sorted(best, key=lambda effects: -best[effects])
-    # Where all are close, more go on.
-    ranked = [name for place, name in enumerate(ranked) if place < most or best[name] > best[ranked[0]] - close]
-    return [k for k, effects in enumerate(names) if effects in ranked and evidence[k] >= best[effects] - AS_GOOD]
+def _of_ground(job: _Job, grip: GripEvidence | None) -> float:
+    """Return the evidence of a job's ground along its path, with what the grippers' poses say of it [nat]."""
+    return job.ground.evidence + (job.base.beside if grip is not None else 0.0)
