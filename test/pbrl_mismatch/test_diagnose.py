@@ -16,6 +16,7 @@ from scipy.stats import kstest
 from pbrl_bag.types import Recording, WrenchStream
 from pbrl_mismatch import DiagnoseOptions, Diagnosis, MismatchError, diagnose, track_of
 from pbrl_mismatch.diagnose import least_of_two, with_library
+from pbrl_mismatch.report import NOTHING_TRIED
 from pbrl_model.errors import ModelError
 
 QUICK = {"draws": 60, "shortlist": 4, "survivors": (2,)}
@@ -74,11 +75,14 @@ def test_the_same_seed_gives_the_same_report_whatever_the_threads(dragged: Recor
     assert json.dumps(again) == json.dumps(found.to_report()["objects"])
 
 
-def test_a_withheld_effect_is_unknown_rather_than_a_wrong_name(dragged: Recording) -> None:
-    options = DiagnoseOptions(without=without_all_but("floor_slope", "time_offset"), baseline=("free",), **QUICK)
+@pytest.mark.parametrize(("left", "said"), [(("floor_slope", "time_offset"), "noise floor"), ((), NOTHING_TRIED)])
+def test_a_withheld_effect_is_unknown_rather_than_a_wrong_name(
+    dragged: Recording, left: tuple[str, ...], said: str
+) -> None:
+    options = DiagnoseOptions(without=without_all_but(*left), baseline=("free",), **QUICK)
     one = diagnose(dragged, options).objects["table"]
     assert one.mismatch and one.unknown and not one.effects
-    assert any("noise floor" in note for note in one.notes)
+    assert any(said in note for note in one.notes)
     described = json.loads(json.dumps(one.report["unknown_description"], allow_nan=False))
     assert described["sentences"] and described["share_explained"] > 0.5
     if one.next_push is not None:

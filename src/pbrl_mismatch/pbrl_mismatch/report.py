@@ -25,6 +25,7 @@ NAMED = 0.5
 """An effect is named where it is at least so probable; otherwise it is an alternative."""
 EXPLAINED = 1.35
 """A hypothesis that needs a larger scale of the noise than this has not reached the noise floor."""
+NOTHING_TRIED = "nothing that the library was left with can be laid on this body: leave it more (option `without`)"
 SHARE_LEFT, NEAR = 0.1, 2.0
 """Unless it leaves less than this share of the baseline's scale, as a logarithm, and needs a scale below this."""
 LEFT_OUT = 1e-7
@@ -93,7 +94,7 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
     alone = [each.effects[0] for each in weighed if len(each.effects) == 1]
     others = [_weightiest_first(each, alone) for each in weighed if each.effects]
     if not others:
-        return Findings((), (), ())
+        return Findings((), (), (NOTHING_TRIED,) if weighed else ())
     best, notes = others[0], []
     short = _falls_short(best, baseline, exact=exact)
     named = bool(weighed[0].effects) and best.probability >= NAMED and not short and not best.vetoed

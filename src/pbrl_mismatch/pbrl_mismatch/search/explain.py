@@ -76,6 +76,8 @@ def explain(
     bases = [trace(longest, options, each, each.peak.coordinates) for each in bases]
     bases = likeliest_first(bases)
     tried = _tried(seeds[0], track, _grounds(bases), stages, grip, options)
+    if not tried:  # The library has nothing left that this recording could show.
+        return Explained(weigh(bases, tried, options), bases, stages, -math.inf)
     bases = led(bases, tried, stages, options)
     singles = weigh(bases, tried, options)
     if _falls_short(tried) and len(stages.fitted) > 1:
