@@ -15,7 +15,7 @@ from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import Fitted, alone, tops
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.objective import Objective
+from pbrl_mismatch.search.objective import Objective, scattered
 
 
 def test_what_is_unexplained_is_what_its_likelihood_lacks_to_that_of_noise(
@@ -28,8 +28,16 @@ def test_what_is_unexplained_is_what_its_likelihood_lacks_to_that_of_noise(
     # A window that is explained down to the noise has no more misfit than numbers; below, its likelihood is as it is.
     noise = np.minimum(level.peak.misfit, objective.counts)
     lacks = objective.likelihood(noise) - objective.likelihood(level.peak.misfit)
-    assert level.unexplained == pytest.approx(float(lacks[0]), rel=1e-9)
+    by_chance = sum(scattered(count) for count in objective.counts)
+    assert level.unexplained == pytest.approx(float(lacks[0]) - by_chance, rel=1e-9)
     assert level.unexplained > 100.0
+
+
+@pytest.mark.parametrize("count", [12.0, 60.0, 123.0])
+def test_windows_of_noise_alone_cost_what_is_taken_off(count: float) -> None:
+    misfit = np.random.default_rng(0).chisquare(count, 200_000)
+    cost = 0.5 * count * np.log(np.maximum(misfit / count, 1.0))
+    assert scattered(count) == pytest.approx(cost.mean(), abs=4.0 * cost.std() / math.sqrt(len(cost)))
 
 
 def test_of_a_climb_a_law_that_ran_away_is_the_last(concealed_recording: Callable[..., Recording]) -> None:

@@ -18,7 +18,7 @@ from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import Peak, climb
 from pbrl_mismatch.search.heldout import Score, held_out_score
 from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
-from pbrl_mismatch.search.objective import Objective
+from pbrl_mismatch.search.objective import Objective, scattered
 from pbrl_mismatch.search.path.along import lay_along
 from pbrl_mismatch.search.path.climb import climb_along
 from pbrl_mismatch.search.path.ground import FINE, Traced, traced_score
@@ -148,8 +148,12 @@ class Fitted:
 
     @property
     def unexplained(self) -> float:
-        """Return how much likelier its poses would be, were what it leaves of them no more than noise [nat]."""
-        return float(self.peak.objective.counts.sum()) * math.log(self.usual_scale)
+        """Return how much likelier its poses would be, were what it leaves of them no more than noise [nat].
+
+        Noise alone scatters, and a window's scale follows it upwards: that much is not counted.
+        """
+        counts = self.peak.objective.counts
+        return max(float(counts.sum()) * math.log(self.usual_scale) - sum(map(scattered, counts)), 0.0)
 
 
 def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:

@@ -14,9 +14,11 @@ leaves much unexplained: what no law has right, a knock, a foot that sticks, the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.data.simulation import poses
@@ -157,6 +159,18 @@ class Objective:
         change /= np.concatenate([steps, nuisance_steps[:loose]])[:, None, None]
         change = np.moveaxis(change, 1, -1)
         return Linear(residual, change[..., :free], change[..., free:] if spread is None else spread)
+
+
+@cache
+def scattered(count: float) -> float:
+    """Return how much a window of so many numbers costs on average by its best scale, were all of it noise [nat].
+
+    The misfit is then a chi-square with as many degrees of freedom, whatever the window's nuisances are; half of such
+    windows scatter above one a number, about half the square root of count / pi is paid for it.
+    """
+    tail = np.polynomial.legendre.leggauss(64)
+    above, weight = 0.5 * (tail[0] + 1.0) * chi2.sf(count, count), 0.5 * tail[1] * chi2.sf(count, count)
+    return float(0.5 * count * (weight @ np.log(chi2.isf(above, count) / count)))
 
 
 @dataclass(frozen=True)

@@ -53,8 +53,8 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
     left. So do the kinds of baseline that are left under it.
 
     Several effects together have to explain clearly more of the motion, beyond the best of their parts, than what a
-    law that is a little wrong leaves for any other to take: a share of what that part explains, or as much as the
-    likeliest set of so many leaves unexplained, where that is more. Both tell of one wrongness, and count once.
+    law that is a little wrong leaves for any other to take: a share of what that part explains, and as much as the
+    likeliest set of so many leaves unexplained.
 
     Args:
         bases: kinds of baseline, fitted.
@@ -77,7 +77,7 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
             parts = [best[other] for other in groups if other and set(other) < set(key)]
             known = max((_of_motion(part) for part in parts), default=-math.inf)
             wrong = DISCREPANCY * max(known - _of_motion(best[()]), 0.0)
-            weight -= max(wrong, left[len(key)]) + CLEAR * (len(key) - 1)
+            weight -= wrong + left[len(key)] + CLEAR * (len(key) - 1)
         limits = [_evidence(best[other]) for other in _limits(key) if other in groups]
         weight -= REFINED * max(max(limits, default=none) - none, 0.0)
         entries.append(Weighed(key, best[key], weight, 0.0, False))
