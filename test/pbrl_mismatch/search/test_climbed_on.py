@@ -14,7 +14,7 @@ from pbrl_mismatch import EFFECTS, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.climbed_on import parts_led, starts_from
+from pbrl_mismatch.search.climbed_on import over_longest, parts_led, starts_from
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
@@ -91,3 +91,19 @@ def test_a_hold_that_gives_way_leads_nothing(fitted: Any) -> None:
     weighed = in_order(with_effects(sloped, "floor_slope", GRASP_COMPLIANCE))
     led = parts_led(weighed, tried, stages, options)
     assert all(one is other for one, other in zip(led, tried, strict=True))
+
+
+def test_a_set_of_short_windows_is_over_long_ones_at_least_what_its_part_is(fitted: Any) -> None:
+    sloped = fitted[1]
+    track, longest = sloped.peak.objective.cuts.track, sloped.peak.objective.cuts
+    stages, options = Stages((cut_windows(track, 1.0), longest), ()), DiagnoseOptions()
+    scene = scene_of(track, sloped.hypothesis.rows(sloped.peak.coordinates)[0])
+    both = sloped.hypothesis.with_effect(EFFECTS["viscous_drag"], scene, 0)
+    begun = climb(Objective(both, stages.fitted[0], FLOOR), both.mean[None], iterations=0)
+    short = Fitted(both, begun, None)
+    held = with_effects(short, "floor_slope", GRASP_COMPLIANCE)
+    (found,) = over_longest(in_order(sloped, held, short), [sloped], stages, options)
+    assert found.hypothesis is both and found.peak.objective.cuts is longest
+    assert found.traced is not None and found.over_shorter().peak is begun
+    # For a drag of which there is nothing it loses no more than what its freedom costs.
+    assert found.simulated > sloped.simulated - 5.0

@@ -16,6 +16,7 @@ from pbrl_mismatch.search.fitted import Fitted, Stages, alone, apart_rows, likel
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hops import hopped
 from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
+from pbrl_mismatch.search.library import trace
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.ground import traced
 from pbrl_mismatch.search.weigh import Weighed
@@ -159,21 +160,60 @@ def _crossed(
     return crossed
 
 
+def over_longest(
+    weighed: tuple[Weighed, ...], parts: list[Fitted], stages: Stages, options: DiagnoseOptions
+) -> list[Fitted]:
+    """Return the sets that explain most of shorter windows, climbed on over the longest ones and along the path.
+
+    Args:
+        weighed: over the shorter windows.
+        parts: single effects as they were over the longest windows, from where a set is climbed as well.
+        stages: the longest windows among them.
+        options: settings.
+    """
+    cuts = stages.fitted[-1]
+
+    def climbed(whole: Fitted) -> Fitted:
+        hypothesis, own = whole.hypothesis, whole.peak.coordinates[0]
+        within = [each for each in parts if is_part(each, whole)]
+        crossed = [_crossed(hypothesis, own, each.hypothesis, each.peak.coordinates[0]) for each in within]
+        starts = np.unique([own, hypothesis.as_believed(own), *crossed], axis=0)
+        objective = Objective(hypothesis, cuts, options.sensor_floor)
+        peak = alone(climb(objective, starts, iterations=LONGER * options.iterations[-1]))
+        return trace(cuts, options, replace(whole, peak=peak, shorter=whole.peak), peak.coordinates)
+
+    with ThreadPoolExecutor(options.workers) as pool:
+        return hopped(list(pool.map(climbed, _leading_sets(weighed))), cuts, options)
+
+
+def _leading_sets(weighed: tuple[Weighed, ...]) -> list[Fitted]:
+    """Return the sets that explain most.
+
+    A hold that gives way leads nothing: it is laid on a top as it is and learned beside the motion.
+    """
+    sets = [each.fitted for each in weighed if len(each.effects) > 1 and GRASP_COMPLIANCE not in each.effects]
+    return likeliest_first(sets)[:LEADS]
+
+
+def is_part(part: Fitted, whole: Fitted) -> bool:
+    """Tell whether the one has some of the other's effects and no others."""
+    return set(part.hypothesis.effects) < set(whole.hypothesis.effects)
+
+
 def parts_led(
     weighed: tuple[Weighed, ...], tried: list[Fitted], stages: Stages, options: DiagnoseOptions
 ) -> list[Fitted]:
     """Return what was tried, the parts of the sets that explain most climbed on from where those have them.
 
     An effect of which there is nothing may have done no more than lead another to a better top: alone that does as well
-    there. A hold that gives way leads nothing: it is laid on a top as it is and learned beside the motion.
+    there.
     """
-    sets = [each.fitted for each in weighed if len(each.effects) > 1 and GRASP_COMPLIANCE not in each.effects]
-    sets = likeliest_first(sets)[:LEADS]
+    sets = _leading_sets(weighed)
 
     def led_on(part: Fitted) -> Fitted:
-        effects, found = set(part.hypothesis.effects), part
+        found = part
         for whole in sets:
-            if effects < set(whole.hypothesis.effects) and whole.evidence > part.evidence:
+            if is_part(part, whole) and whole.evidence > part.evidence:
                 found = _climbed_on(found, whole, stages, options)
         return found
 

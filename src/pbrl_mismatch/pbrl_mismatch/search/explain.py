@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -13,7 +13,15 @@ from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_mismatch.search.climbed_on import POLISHED_OF_SETS, keeps_up, led, parts_led, polished
+from pbrl_mismatch.search.climbed_on import (
+    POLISHED_OF_SETS,
+    is_part,
+    keeps_up,
+    led,
+    over_longest,
+    parts_led,
+    polished,
+)
 from pbrl_mismatch.search.fitted import Fitted, Stages, judged, likeliest_first
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
 from pbrl_mismatch.search.hops import REACHED, hopped
@@ -61,7 +69,8 @@ def explain(
     """Try single effects, then others on top of the likeliest for as long as something is still left out.
 
     Long windows say most of a force, but where feet stick and let go nothing predicts them: where no effect reaches the
-    noise floor over the longest, the next shorter ones are asked.
+    noise floor over the longest, the next shorter ones are asked. Several together, found there, may reach it over the
+    longest after all, and are then weighed there.
 
     Args:
         seed: of every draw.
@@ -78,11 +87,12 @@ def explain(
     tried = _tried(seeds[0], track, _grounds(bases), stages, grip, options)
     if not tried:  # The library has nothing left that this recording could show.
         return Explained(weigh(bases, tried, options), bases, stages, -math.inf)
-    bases = led(bases, tried, stages, options)
+    bases, given_up = led(bases, tried, stages, options), None
     singles = weigh(bases, tried, options)
     if _falls_short(tried) and len(stages.fitted) > 1:
         tried = polished(singles, tried, stages, options, hops=False)
     if _falls_short(tried) and len(stages.fitted) > 1:
+        given_up = Tried(stages, bases, tried)
         stages, bases = stages.without_longest(), [each.over_shorter() for each in bases]
         bases = likeliest_first(bases)
         tried = [beside_motion(each.over_shorter(), grip) for each in tried]
@@ -110,8 +120,43 @@ def explain(
         likely = tuple(each for each in weigh(bases, [*tried, *more], options) if len(each.effects) != depth)
         tried += [beside_motion(each, grip) for each in polished(likely, more, stages, options, POLISHED_OF_SETS)]
         weighed = weigh(bases, tried, options)
+    if given_up is not None and (back := with_sets(given_up, weighed, grip, options)) is not None:
+        stages, bases, tried = back.stages, back.bases, back.tried
+        weighed = weigh(bases, tried, options)
     tried = [beside_motion(each, grip) for each in parts_led(weighed, tried, stages, options)]
     return Explained(weigh(bases, tried, options), bases, stages, odds)
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What was tried over windows up to some length, and the kinds of baseline."""
+
+    stages: Stages
+    bases: list[Fitted]
+    tried: list[Fitted]
+
+
+def with_sets(
+    longest: Tried, weighed: tuple[Weighed, ...], grip: GripEvidence | None, options: DiagnoseOptions
+) -> Tried | None:
+    """Return the longest windows with sets that shorter ones have found, if one of these predicts them.
+
+    Args:
+        longest: single effects over windows that none of them predicts.
+        weighed: over shorter windows.
+        grip: what the grippers' poses say; None where none was seen.
+        options: settings.
+    """
+    sets = over_longest(weighed, longest.tried, longest.stages, options)
+    if not sets or _falls_short(sets):
+        return None
+    # What has hopped is held against what has hopped as well.
+    parts = [k for k, each in enumerate(longest.tried) if any(is_part(each, whole) for whole in sets)]
+    ahead = max(each.evidence for each in sets)
+    cuts, tried = longest.stages.fitted[-1], list(longest.tried)
+    for k, part in zip(parts, hopped([tried[k] for k in parts], cuts, options, ahead), strict=True):
+        tried[k] = part
+    return replace(longest, tried=[beside_motion(each, grip) for each in [*tried, *sets]])
 
 
 def _grounds_of_sets(weighed: tuple[Weighed, ...], depth: int, track: Track, lacks: bool) -> list[Fitted]:
