@@ -183,7 +183,7 @@ def over_longest(
         return trace(cuts, options, replace(whole, peak=peak, shorter=whole.peak), peak.coordinates)
 
     with ThreadPoolExecutor(options.workers) as pool:
-        return hopped(list(pool.map(climbed, _leading_sets(weighed))), cuts, options)
+        return list(pool.map(climbed, _leading_sets(weighed)))
 
 
 def _leading_sets(weighed: tuple[Weighed, ...]) -> list[Fitted]:

@@ -150,13 +150,12 @@ def with_sets(
     sets = over_longest(weighed, longest.tried, longest.stages, options)
     if not sets or _falls_short(sets):
         return None
+    parts = [any(is_part(each, whole) for whole in sets) for each in longest.tried]
+    others = [each for each, part in zip(longest.tried, parts, strict=True) if not part]
+    compared = [each for each, part in zip(longest.tried, parts, strict=True) if part] + sets
     # What has hopped is held against what has hopped as well.
-    parts = [k for k, each in enumerate(longest.tried) if any(is_part(each, whole) for whole in sets)]
-    ahead = max(each.evidence for each in sets)
-    cuts, tried = longest.stages.fitted[-1], list(longest.tried)
-    for k, part in zip(parts, hopped([tried[k] for k in parts], cuts, options, ahead), strict=True):
-        tried[k] = part
-    return replace(longest, tried=[beside_motion(each, grip) for each in [*tried, *sets]])
+    ends = hopped(compared, longest.stages.fitted[-1], options, max(each.evidence for each in sets))
+    return replace(longest, tried=[beside_motion(each, grip) for each in [*others, *ends]])
 
 
 def _grounds_of_sets(weighed: tuple[Weighed, ...], depth: int, track: Track, lacks: bool) -> list[Fitted]:
