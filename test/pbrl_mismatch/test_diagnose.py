@@ -13,6 +13,7 @@ import pytest
 from concealed_cases import concealed
 from scipy.stats import kstest
 
+from pbrl_bag import read_recording, write_recording
 from pbrl_bag.types import Recording, WrenchStream
 from pbrl_mismatch import DiagnoseOptions, Diagnosis, MismatchError, diagnose, track_of
 from pbrl_mismatch.diagnose import least_of_two, with_library
@@ -45,6 +46,18 @@ def test_what_was_left_out_is_named_and_the_repair_predicts_better(found: Diagno
     heldout = one.report["heldout"]
     assert heldout["rmse_position_m"]["repaired"] < heldout["rmse_position_m"]["baseline"]
     assert heldout["log_score"]["repaired"] > heldout["log_score"]["baseline"] + 10.0
+
+
+def test_a_bag_is_diagnosed_as_what_was_written_into_it(dragged: Recording, found: Diagnosis, tmp_path: Path) -> None:
+    bag = write_recording(dragged, tmp_path / "dragged")
+    options = DiagnoseOptions(without=without_all_but(*FEW), baseline=("free",), **QUICK)
+    again, before = diagnose(read_recording(bag), options).objects["table"], found.objects["table"]
+    # A bag's stamps are whole nanoseconds and the rest is as it was: nothing but rounding may differ.
+    assert [each.effect for each in again.effects] == [each.effect for each in before.effects]
+    assert again.hypotheses[0].fitted.evidence == pytest.approx(before.hypotheses[0].fitted.evidence, abs=0.5)
+    for one, other in zip(again.effects, before.effects, strict=True):
+        for name, told in other.parameters.items():
+            assert one.parameters[name]["mean"] == pytest.approx(told["mean"], abs=0.5 * float(told["sd"]))
 
 
 def test_the_report_has_the_contract_s_form(found: Diagnosis) -> None:
