@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,6 +33,10 @@ def test_what_is_unexplained_is_what_its_likelihood_lacks_to_that_of_noise(
     by_chance = sum(scattered(count) for count in objective.counts)
     assert level.unexplained == pytest.approx(float(lacks[0]) - by_chance, rel=1e-9)
     assert level.unexplained > 100.0
+    # A path has one scale for all, of which nothing is taken off.
+    path: Any = SimpleNamespace(noise_scale=1.01)
+    along = replace(level, traced=path)
+    assert along.unexplained == pytest.approx(objective.counts.sum() * math.log(1.01))
 
 
 @pytest.mark.parametrize("count", [12.0, 60.0, 123.0])

@@ -142,18 +142,26 @@ class Fitted:
         It is what the likelihood pays for. A window in which a simulation runs away, as where a contact is met a moment
         early, counts for the one that it is; in the root mean square it would count for all.
         """
-        counts = self.peak.objective.counts
-        simulated = math.exp(-0.5 * float(counts @ np.log(self.peak.weight[0]) / counts.sum()))
+        simulated = math.exp(self._paid / self.peak.objective.counts.sum())
         return simulated if self.traced is None else min(simulated, self.traced.noise_scale)
 
     @property
     def unexplained(self) -> float:
         """Return how much likelier its poses would be, were what it leaves of them no more than noise [nat].
 
-        Noise alone scatters, and a window's scale follows it upwards: that much is not counted.
+        Noise alone scatters, and the scale of a simulated window follows it upwards: that much is not counted. A path
+        has one scale for all, which hardly scatters.
         """
         counts = self.peak.objective.counts
-        return max(float(counts.sum()) * math.log(self.usual_scale) - sum(map(scattered, counts)), 0.0)
+        simulated = max(self._paid - sum(map(scattered, counts)), 0.0)
+        if self.traced is None:
+            return simulated
+        return min(simulated, float(counts.sum()) * math.log(self.traced.noise_scale))
+
+    @property
+    def _paid(self) -> float:
+        """Return what simulated windows pay by their scales [nat]."""
+        return -0.5 * float(self.peak.objective.counts @ np.log(self.peak.weight[0]))
 
 
 def cut_stages(track: Track, options: DiagnoseOptions) -> Stages:
