@@ -143,6 +143,14 @@ def test_places_and_strengths_are_those_of_the_file(tmp_path: Path) -> None:
     assert hold.stiffness == pytest.approx(2000.0) and hold.play == 2e-3
 
 
+@pytest.mark.parametrize(("found", "given"), [(0.1, 0.1), (0.5, 0.9 * 0.2 / 0.8)])
+def test_a_crate_weighs_what_was_found_unless_it_would_tip(tmp_path: Path, found: float, given: float) -> None:
+    numbers = {**NUMBERS["unseen_body"], "unseen_friction": found}
+    crate = with_model(scene(), write(tmp_path, {"unseen_body": numbers})).concealed.unseen_body[0]
+    assert crate.friction == pytest.approx(given)
+    assert crate.nominal_mass == pytest.approx(12.0 / (given * GRAVITY))
+
+
 def test_a_post_is_as_square_as_it_was_found(tmp_path: Path) -> None:
     numbers = {**NUMBERS["hidden_obstacle"], "obstacle_angle": 0.3}
     numbers.pop("obstacle_friction")

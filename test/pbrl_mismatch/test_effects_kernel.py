@@ -209,11 +209,14 @@ def test_obstacle_holds_with_its_stiffness(bench: Any) -> None:
     assert path[-1, 0] == pytest.approx(0.1 + 20.0 / 10000.0, abs=2e-4)
 
 
-def test_unseen_body_resists_by_its_friction_once_met(bench: Any) -> None:
-    path = bench(pushed(20.0, 200)).run(unseen_force=8.0, unseen_x=0.8, unseen_radius=0.1)
+@pytest.mark.parametrize("friction", [0.1, 0.5])
+def test_unseen_body_resists_by_its_friction_and_goes_along_once_met(bench: Any, friction: float) -> None:
+    told = {"unseen_force": 8.0, "unseen_x": 0.8, "unseen_radius": 0.1, "unseen_friction": friction}
+    path = bench(pushed(20.0, 200)).run(**told)
     change = np.diff(speeds(path)[:, 0]) / DT
     assert change[5] == pytest.approx(1.0, rel=1e-6)
-    assert np.mean(change[120:180]) == pytest.approx((20.0 - 8.0) / MASS, rel=0.03)
+    both = MASS + 8.0 / (friction * GRAVITY)
+    assert np.mean(change[150:190]) == pytest.approx((20.0 - 8.0) / both, rel=0.03)
 
 
 def test_hidden_hinge_holds_its_point(bench: Any) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 from pbrl_mismatch.kernels.contact_kernel import contacts
+from pbrl_mismatch.kernels.crate_kernel import CRUSHING
 from pbrl_mismatch.kernels.state import STATE
 
 STIFFNESS, HALF, DEPTH = 10_000.0, 0.05, 1e-3
@@ -30,7 +31,20 @@ def felt(
     """Return the account (9,) of what a body feels."""
     acc, state = np.zeros(9), np.zeros(STATE)
     state[:3] = x, y, heading
-    contacts(p, state, math.cos(heading), math.sin(heading), 20.0, np.zeros(2), np.zeros(3), outline, 0.01, acc)
+    contacts(
+        p,
+        state,
+        math.cos(heading),
+        math.sin(heading),
+        20.0,
+        1.0,
+        np.zeros(2),
+        np.zeros(3),
+        outline,
+        0.01,
+        CRUSHING,
+        acc,
+    )
     return acc
 
 

@@ -107,3 +107,33 @@ def test_a_set_of_short_windows_is_over_long_ones_at_least_what_its_part_is(fitt
     assert found.traced is not None and found.over_shorter().peak is begun
     # For a drag of which there is nothing it loses no more than what its freedom costs.
     assert found.simulated > sloped.simulated - 5.0
+
+
+def test_a_set_has_an_effect_as_another_set_found_it_where_that_is_likelier(fitted: Any) -> None:
+    sloped = fitted[1]
+    longest = sloped.peak.objective.cuts
+    stages, options = Stages((cut_windows(longest.track, 1.0), longest), ()), DiagnoseOptions(iterations=(1, 1))
+    scene = scene_of(longest.track, sloped.hypothesis.rows(sloped.peak.coordinates)[0])
+    free = fitted[0].hypothesis
+
+    def over_short(*laws: tuple[str, int], slope: float) -> Fitted:
+        hypothesis = free
+        for name, variant in laws:
+            hypothesis = hypothesis.with_effect(EFFECTS[name], scene, variant)
+        start = hypothesis.mean.copy()
+        for column in ("slope_x", "slope_y"):
+            there = sloped.peak.coordinates[0, sloped.hypothesis.columns.index(column)]
+            start[hypothesis.columns.index(column)] = slope * there
+        return Fitted(
+            hypothesis, climb(Objective(hypothesis, stages.fitted[0], FLOOR), start[None], iterations=0), None
+        )
+
+    lost = over_short(("floor_slope", 0), ("viscous_drag", 0), slope=-20.0)
+    found = over_short(("floor_slope", 0), ("time_offset", 0), slope=1.0)
+    alone_there = over_longest(in_order(sloped, lost), [], stages, options)[0]
+    helped = next(
+        each
+        for each in over_longest(in_order(sloped, lost, found), [], stages, options)
+        if each.hypothesis.effects == lost.hypothesis.effects
+    )
+    assert helped.simulated > alone_there.simulated + 10.0

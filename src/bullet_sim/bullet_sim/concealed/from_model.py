@@ -15,6 +15,7 @@ from bullet_sim.catalogue import Block, Body, Fixture, OnCasters
 from bullet_sim.client import GRAVITY
 from bullet_sim.concealed.detent import peak_distance
 from bullet_sim.concealed.foot_friction import OnGlides
+from bullet_sim.concealed.hidden_bodies import UnseenBodySettings
 
 TREAD, LEAST_LOAD, WHEEL_RADIUS = 0.7, 5.0, 0.05
 """Sliding friction of a wheel's tread; least load that bears on one [N]; its radius [m]."""
@@ -22,8 +23,9 @@ BALLAST_SHARES = (0.15, 0.3, 0.45, 0.6)
 """Shares of a body's mass that are tried as ballast: the less, the further out it has to stand."""
 LEAST_SLIDING = 1e-3
 """Sliding friction of feet that do nothing but stick."""
-CRATE_FRICTION = 0.15
-"""Of an unseen body, so low that it slides and does not tip; its mass is what then needs the force that was found."""
+CRATE_FRICTION, SLIDES = 0.15, 0.9
+"""Of an unseen body where a model says nothing, and at most, of what would tip it where it is pushed at its top. Its
+mass is what then needs the force that was found."""
 LEAST_GIVE = 1e-5
 """Of a hold [m/N]: stiffer ones are all alike, and one that a fit takes below zero is stiff."""
 CORNERS = 16
@@ -246,8 +248,10 @@ def _hidden_obstacle(told: Told) -> dict[str, Any]:
 
 
 def _unseen_body(told: Told) -> dict[str, Any]:
-    mass = told["unseen_force"] / (CRATE_FRICTION * GRAVITY)
-    return {"unseen_body": [{**_standing(told, "unseen"), "nominal_mass": mass, "friction": CRATE_FRICTION}]}
+    tips = told["unseen_radius"] / float(UnseenBodySettings.model_fields["height"].default)
+    friction = min(told.get("unseen_friction", CRATE_FRICTION), SLIDES * tips)
+    mass = told["unseen_force"] / (friction * GRAVITY)
+    return {"unseen_body": [{**_standing(told, "unseen"), "nominal_mass": mass, "friction": friction}]}
 
 
 def _external_force(told: Told) -> dict[str, Any]:

@@ -182,6 +182,7 @@ def _unseen(told: Any, scene: Scene, mass: float) -> dict[str, float]:
         "unseen_radius": CRATE,
         "unseen_angle": told["pose"][2],
         "unseen_force": told["nominal_mass"] * GRAVITY * told["friction"],
+        "unseen_friction": told["friction"],
     }
 
 

@@ -14,6 +14,8 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         plain("unseen_y", float(scene.middle[1]), float(scene.reach[1])),
         positive("unseen_radius", 0.15, 0.5),
         plain("unseen_angle", 0.0, 0.5),
+        positive("unseen_friction", 0.2, 0.7),
+        positive("unseen_tip", 0.6, 0.5),
     )
 
 
@@ -28,7 +30,7 @@ def where(values: Values, scene: Scene) -> Where | None:
 EFFECT = Effect(
     name="unseen_body",
     summary="A movable thing that is not in the scene is met on the way and pushed along.",
-    equation="contact with a disc or a square that slides, and turns, when it is pressed with more than F",
+    equation="contact with a disc or a square of mass F / (mu g) that slides, and turns, against friction F",
     shows="Go back to where it was met: it is gone.",
     parameters=parameters,
     variants=(
@@ -37,6 +39,7 @@ EFFECT = Effect(
             "unseen_x",
             "unseen_y",
             "unseen_radius",
+            "unseen_friction",
         ),
         (
             "unseen_force",
@@ -44,6 +47,8 @@ EFFECT = Effect(
             "unseen_y",
             "unseen_radius",
             "unseen_angle",
+            "unseen_friction",
+            "unseen_tip",
         ),
     ),
     fixed={"unseen_angle": ROUND},

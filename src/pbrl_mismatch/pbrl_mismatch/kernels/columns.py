@@ -105,6 +105,8 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("unseen_y", "m", 0.0),
     ("unseen_radius", "m", 0.15),
     ("unseen_angle", "rad", -10.0),
+    ("unseen_friction", "1", 0.15),
+    ("unseen_tip", "1", 0.0),
     ("bias_x", "N", 0.0),
     ("bias_y", "N", 0.0),
     ("bias_torque", "N m", 0.0),

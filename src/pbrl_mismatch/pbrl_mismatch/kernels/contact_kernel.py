@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.account_kernel import SETTLING, push, resist
-from pbrl_mismatch.kernels.crate_kernel import HELD, ROUND, STIFFNESS, crate_contact, move_crate
+from pbrl_mismatch.kernels.account_kernel import push, resist
+from pbrl_mismatch.kernels.crate_kernel import ROUND, crate_contact
 from pbrl_mismatch.kernels.outline_kernel import nearest_edge
 from pbrl_mismatch.kernels.post_kernel import lean, post_contact
-from pbrl_mismatch.kernels.state import UNSEEN
 
 Array = NDArray[np.float64]
 
@@ -30,19 +29,6 @@ def contact(
     return radius - gap, c * px - s * py, s * px + c * py, c * nx - s * ny, s * nx + c * ny
 
 
-@njit(**LEAF)
-def move_unseen(p: Array, outline: Array, state: Array, c: float, s: float, com: Array) -> None:
-    """Let the unseen body slide away from a footprint that presses it harder than its friction holds."""
-    if p[at.UNSEEN_ANGLE] > ROUND:
-        move_crate(p, outline, state, c, s, com)
-        return
-    depth, _, _, nx, ny = contact(p, outline, state, c, s, com, state[UNSEEN], state[UNSEEN + 1], p[at.UNSEEN_RADIUS])
-    slid = depth - p[at.UNSEEN_FORCE] / STIFFNESS
-    if slid > 0.0:
-        state[UNSEEN] += slid * nx
-        state[UNSEEN + 1] += slid * ny
-
-
 @njit(**LEAF, forceinline=True)
 def contacts(
     p: Array,
@@ -50,10 +36,12 @@ def contacts(
     c: float,
     s: float,
     mass: float,
+    inertia: float,
     com: Array,
     pivot: Array,
     outline: Array,
     dt: float,
+    damped: float,
     acc: Array,
 ) -> None:
     """Add what is too stiff to be seen in a pose, pivots and contacts; for what is not named see `laws_kernel.springs`.
@@ -64,10 +52,12 @@ def contacts(
         c: see `laws_kernel.springs`.
         s: see `laws_kernel.springs`.
         mass: see `laws_kernel.springs`.
+        inertia: about the centre of mass [kg m^2] now.
         com: see `laws_kernel.springs`.
         pivot: (3,) pose of the body's frame when the episode began, which a hidden hinge holds on to.
         outline: (E, 2) footprint, counter-clockwise.
         dt: in which they answer [s].
+        damped: `crate_kernel.CRUSHING`, or `LEANING` along a recorded path [s].
         acc: (9,) account.
     """
     if p[at.PIVOT_STIFFNESS] > 0.0:
@@ -86,13 +76,5 @@ def contacts(
         depth, rx, ry, nx, ny = found
         if depth > 0.0:
             lean(p, state, rx, ry, nx, ny, depth, dt, acc)
-    if p[at.UNSEEN_FORCE] > 0.0 and p[at.UNSEEN_ANGLE] > ROUND:
-        crate_contact(p, outline, state, c, s, com, dt, acc)
-    elif p[at.UNSEEN_FORCE] > 0.0:
-        found = contact(p, outline, state, c, s, com, state[UNSEEN], state[UNSEEN + 1], p[at.UNSEEN_RADIUS])
-        depth, rx, ry, nx, ny = found
-        if depth > 0.0:
-            force = min(STIFFNESS * depth, p[at.UNSEEN_FORCE])
-            push(acc, rx, ry, -force * nx, -force * ny)
-            if force < HELD * p[at.UNSEEN_FORCE]:
-                resist(acc, rx, ry, nx, ny, STIFFNESS * (dt + SETTLING))
+    if p[at.UNSEEN_FORCE] > 0.0:
+        crate_contact(p, outline, state, c, s, mass, inertia, com, dt, damped, acc)

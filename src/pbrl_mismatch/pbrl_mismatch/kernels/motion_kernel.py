@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.contact_kernel import move_unseen
+from pbrl_mismatch.kernels.crate_kernel import FOLLOWING, move_crate
 from pbrl_mismatch.kernels.laws_kernel import FOOT, on_casters
 from pbrl_mismatch.kernels.sense_kernel import acting, as_seen, load_now, to_truth
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH, STATE, UNSEEN
@@ -37,7 +37,7 @@ def rehearse_windows(
 ) -> None:
     """Find what moves besides the body as it is when each window starts, in one walk along the recorded motion.
 
-    Casters, and a body that was met, stay as they were between two grasps; a load has come to rest by then.
+    Casters, and a body that was met, stay where they were between two grasps; what moved has come to rest by then.
 
     Args:
         p: (WIDTH,) parameter row.
@@ -64,7 +64,7 @@ def rehearse_windows(
         while True:
             if span[w, BEGIN] > begin and t >= span[w, BEGIN]:
                 begin = span[w, BEGIN]
-                state[SLOSH : SLOSH + 4] = 0.0
+                state[SLOSH : SLOSH + 4] = state[UNSEEN + 3 :] = 0.0
             if t >= span[w, FIRST]:
                 break
             to_truth(p, seen[t], body, com, state)
@@ -72,7 +72,7 @@ def rehearse_windows(
             if casters:
                 turn_casters(p, state, c, s, com, feet, stride * dt)
             if meets:
-                move_unseen(p, outline, state, c, s, com)
+                move_crate(p, outline, state, c, s, com, stride * dt, FOLLOWING)
             if swings and t + 1 < seen.shape[0] and t + 1 != span[w, BEGIN]:
                 ax, ay = (seen[t + 1, 3] - seen[t, 3]) / dt, (seen[t + 1, 4] - seen[t, 4]) / dt
                 swing_load(p, state, ax, ay, (seen[t + 1, 5] - seen[t, 5]) / dt, c, s, com, dt)

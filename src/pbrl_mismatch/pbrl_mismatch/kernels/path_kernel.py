@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.contact_kernel import contacts, move_unseen
+from pbrl_mismatch.kernels.contact_kernel import contacts
+from pbrl_mismatch.kernels.crate_kernel import FOLLOWING, LEANING
 from pbrl_mismatch.kernels.laws_kernel import FOOT, springs
 from pbrl_mismatch.kernels.motion_kernel import BEGIN, LAST, rehearse
 from pbrl_mismatch.kernels.sense_kernel import acting, load_now, to_truth
@@ -82,8 +82,6 @@ def accelerate_along(
             state[1] += vy * dt
             state[2] += omega * dt
             c, s = cos_sin(state[2])
-            if p[at.UNSEEN_FORCE] > 0.0:
-                move_unseen(p, outline, state, c, s, com)
             acc[:3] = wrench
             acc[3:] = 0.0
             springs(p, state, c, s, clock[step], mass, com, dt, acc)
@@ -91,7 +89,7 @@ def accelerate_along(
             acc[1] -= acc[4] * vx + acc[5] * vy + acc[7] * omega
             acc[2] -= acc[6] * vx + acc[7] * vy + acc[8] * omega
             acc[3:] = 0.0
-            contacts(p, state, c, s, mass, com, pivot, outline, REACTION, acc)
+            contacts(p, state, c, s, mass, inertia, com, pivot, outline, REACTION, LEANING, acc)
             _, _, _ = respond(p, state, c, s, mass, inertia, com, feet, axes, acc, room, REACTION)
             turn = (state[5] - omega) / REACTION
             out[r, n, 0] = (state[3] - vx) / REACTION - turn * ry - omega * omega * rx
@@ -101,4 +99,6 @@ def accelerate_along(
             after = min(t + stride, path.shape[0] - 1)
             passed = max(after - t, 1) * dt
             ax, ay = (path[after, 3] - path[t, 3]) / passed, (path[after, 4] - path[t, 4]) / passed
-            remember(p, state, ax, ay, (path[after, 5] - path[t, 5]) / passed, c, s, com, feet, passed)
+            remember(
+                p, state, ax, ay, (path[after, 5] - path[t, 5]) / passed, c, s, com, outline, feet, passed, FOLLOWING
+            )

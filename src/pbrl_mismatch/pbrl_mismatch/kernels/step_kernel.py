@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP
-from pbrl_mismatch.kernels.contact_kernel import contacts, move_unseen
+from pbrl_mismatch.kernels.contact_kernel import contacts
+from pbrl_mismatch.kernels.crate_kernel import CRUSHING, move_crate
 from pbrl_mismatch.kernels.laws_kernel import dry, lay_feet, on_casters, on_feet, resistances, springs, swivel
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
 from pbrl_model.kernel import ERROR_BIAS, GRAVITY, SINGULAR, box_impulses, cos_sin, joint_rows
@@ -259,14 +260,18 @@ def remember(
     c: float,
     s: float,
     com: Array,
+    outline: Array,
     feet: Array,
     dt: float,
+    damped: float,
 ) -> None:
-    """Move what else there is in a body by `dt` [s]: a load by the body's acceleration, casters by its velocity."""
+    """Move what else there is by `dt` [s]: a load by the body's acceleration, casters and a crate by its velocity."""
     if p[at.SLOSH_MASS] > 0.0:
         swing_load(p, state, ax, ay, turned, c, s, com, dt)
     if on_casters(p):
         turn_casters(p, state, c, s, com, feet, dt)
+    if p[at.UNSEEN_FORCE] > 0.0:
+        move_crate(p, outline, state, c, s, com, dt, damped)
 
 
 @njit(**LEAF, forceinline=True)
@@ -308,12 +313,10 @@ def step_body(
     state[1] += state[4] * dt
     state[2] += state[5] * dt
     c, s = cos_sin(state[2])
-    if p[at.UNSEEN_FORCE] > 0.0:
-        move_unseen(p, outline, state, c, s, com)
     acc[0], acc[1], acc[2] = wrench[0], wrench[1], wrench[2]
     acc[3:] = 0.0
     springs(p, state, c, s, time, mass, com, dt, acc)
-    contacts(p, state, c, s, mass, com, pivot, outline, dt, acc)
+    contacts(p, state, c, s, mass, inertia, com, pivot, outline, dt, CRUSHING, acc)
     ax, ay, turned = respond(p, state, c, s, mass, inertia, com, feet, axes, acc, room, dt)
-    remember(p, state, ax, ay, turned, c, s, com, feet, dt)
+    remember(p, state, ax, ay, turned, c, s, com, outline, feet, dt, CRUSHING)
     return c, s

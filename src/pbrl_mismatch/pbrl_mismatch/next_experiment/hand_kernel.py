@@ -18,7 +18,7 @@ from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.laws_kernel import FOOT
 from pbrl_mismatch.kernels.motion_kernel import rehearse
 from pbrl_mismatch.kernels.sense_kernel import as_seen, load_now, to_truth
-from pbrl_mismatch.kernels.state import SLOSH, STATE
+from pbrl_mismatch.kernels.state import SLOSH, STATE, UNSEEN
 from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body
 from pbrl_model.kernel import cos_sin
 
@@ -100,7 +100,7 @@ def push_once(
     mass, inertia = load_now(p, began, body, com)
     to_truth(p, told, body, com, state)
     rehearse(p, seen, span, body, outline, feet, com, state)
-    state[SLOSH : SLOSH + 4] = 0.0
+    state[SLOSH : SLOSH + 4] = state[UNSEEN + 3 :] = 0.0
     fixed_axes(p, dt, axes)
     late = (p[at.DELAY] + p[at.TIME_OFFSET]) / dt
     c, s = cos_sin(state[2])

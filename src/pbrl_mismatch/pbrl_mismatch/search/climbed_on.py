@@ -153,7 +153,7 @@ def _crossed(
     """
     crossed = own.copy()
     not_shared = set() if all_shared else set(hypothesis.effects) - set(other.effects)
-    effect = {column for name in not_shared for v in EFFECTS[name].variants for column in v}
+    effect = {column for name in not_shared for column in columns_of(name)}
     for k, column in enumerate(hypothesis.columns):
         if column in other.columns and column not in effect:
             crossed[k] = coordinates[other.columns.index(column)]
@@ -171,28 +171,50 @@ def over_longest(
         stages: the longest windows among them.
         options: settings.
     """
-    cuts = stages.fitted[-1]
+    cuts, sets = stages.fitted[-1], _sets(weighed)
 
     def climbed(whole: Fitted) -> Fitted:
         hypothesis, own = whole.hypothesis, whole.peak.coordinates[0]
         within = [each for each in parts if is_part(each, whole)]
         crossed = [_crossed(hypothesis, own, each.hypothesis, each.peak.coordinates[0]) for each in within]
-        starts = np.unique([own, hypothesis.as_believed(own), *crossed], axis=0)
+        starts = np.unique([own, hypothesis.as_believed(own), *crossed, *_as_elsewhere(whole, sets)], axis=0)
         objective = Objective(hypothesis, cuts, options.sensor_floor)
         peak = alone(climb(objective, starts, iterations=LONGER * options.iterations[-1]))
         return trace(cuts, options, replace(whole, peak=peak, shorter=whole.peak), peak.coordinates)
 
     with ThreadPoolExecutor(options.workers) as pool:
-        return list(pool.map(climbed, _leading_sets(weighed)))
+        return list(pool.map(climbed, sets[:LEADS]))
 
 
-def _leading_sets(weighed: tuple[Weighed, ...]) -> list[Fitted]:
-    """Return the sets that explain most.
+def _sets(weighed: tuple[Weighed, ...]) -> list[Fitted]:
+    """Return the sets, those first that explain most.
 
     A hold that gives way leads nothing: it is laid on a top as it is and learned beside the motion.
     """
     sets = [each.fitted for each in weighed if len(each.effects) > 1 and GRASP_COMPLIANCE not in each.effects]
-    return likeliest_first(sets)[:LEADS]
+    return likeliest_first(sets)
+
+
+def _as_elsewhere(whole: Fitted, sets: list[Fitted]) -> list[Array]:
+    """Return coordinates (K,) of a set with each of its effects as the likeliest other set has it.
+
+    What is sought beside one law may be found beside another that leaves it more to explain: alone it takes the place
+    of what acts more strongly, beside that it ends in another hollow.
+    """
+    hypothesis, own, found = whole.hypothesis, whole.peak.coordinates[0], []
+    for name in hypothesis.effects:
+        other = next((each for each in sets if name in each.hypothesis.effects and each is not whole), None)
+        if other is not None:
+            its = dict(zip(other.hypothesis.columns, other.peak.coordinates[0], strict=True))
+            law = columns_of(name)
+            pairs = zip(hypothesis.columns, own, strict=True)
+            found.append(np.array([its.get(column, value) if column in law else value for column, value in pairs]))
+    return found
+
+
+def columns_of(name: str) -> set[str]:
+    """Return the columns of an effect's laws."""
+    return {column for variant in EFFECTS[name].variants for column in variant}
 
 
 def is_part(part: Fitted, whole: Fitted) -> bool:
@@ -208,7 +230,7 @@ def parts_led(
     An effect of which there is nothing may have done no more than lead another to a better top: alone that does as well
     there.
     """
-    sets = _leading_sets(weighed)
+    sets = _sets(weighed)[:LEADS]
 
     def led_on(part: Fitted) -> Fitted:
         found = part
