@@ -14,7 +14,7 @@ from pbrl_mismatch import EFFECTS, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.climbed_on import over_longest, parts_led, starts_from
+from pbrl_mismatch.search.climbed_on import over_longest, parts_led, polished, starts_from
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
@@ -137,3 +137,23 @@ def test_a_set_has_an_effect_as_another_set_found_it_where_that_is_likelier(fitt
         if each.hypothesis.effects == lost.hypothesis.effects
     )
     assert helped.simulated > alone_there.simulated + 10.0
+
+
+@pytest.mark.parametrize(("name", "too"), [("hidden_obstacle", True), ("viscous_drag", False)])
+def test_a_contact_s_other_shapes_are_climbed_on_with_its_best(fitted: Any, name: str, too: bool) -> None:
+    free = fitted[0]
+    cuts = free.peak.objective.cuts
+    scene = scene_of(cuts.track, free.row)
+
+    def laid(variant: int, heavier: float) -> Fitted:
+        hypothesis = free.hypothesis.with_effect(EFFECTS[name], scene, variant)
+        start = hypothesis.mean.copy()
+        start[hypothesis.columns.index("mass")] += heavier
+        return Fitted(hypothesis, climb(Objective(hypothesis, cuts, FLOOR), start[None], iterations=0), None)
+
+    best, other = laid(0, 0.0), laid(1, 1.0)
+    weighed = (Weighed((name,), best, 0.0, 0.9, False), Weighed((), free, -1.0, 0.1, False))
+    options = DiagnoseOptions(iterations=(2, 2))
+    _, found = polished(weighed, [best, other], Stages((cuts,), ()), options, hops=False)
+    assert (found is not other) is too
+    assert found.simulated > other.simulated + 10.0 or not too

@@ -86,6 +86,9 @@ def polished(
     # Where nothing explains anything yet, a law that is right may still be on its way: all go on.
     names = [each.effects for each in weighed if each.effects][: most if best.evidence > none + EXPLAINS else None]
     chosen = {id(each.fitted) for each in weighed if each.effects in names}
+    if any(EFFECTS[name].touches is not None for name in best.hypothesis.effects):
+        # A contact of one shape shows the others where it is.
+        chosen |= {id(each) for each in tried if each.hypothesis.effects == best.hypothesis.effects}
     jobs = [each for each in tried if id(each) in chosen and GRASP_COMPLIANCE not in each.hypothesis.effects]
     with ThreadPoolExecutor(options.workers) as pool:
         found = list(pool.map(lambda each: _climbed_on(each, best, stages, options), jobs))
