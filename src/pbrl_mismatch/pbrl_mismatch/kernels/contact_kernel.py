@@ -12,21 +12,10 @@ from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import push, resist
 from pbrl_mismatch.kernels.crate_kernel import ROUND, crate_contact
-from pbrl_mismatch.kernels.outline_kernel import nearest_edge
+from pbrl_mismatch.kernels.outline_kernel import disc_contact
 from pbrl_mismatch.kernels.post_kernel import lean, post_contact
 
 Array = NDArray[np.float64]
-
-
-@njit(**LEAF)
-def contact(
-    p: Array, outline: Array, state: Array, c: float, s: float, com: Array, qx: float, qy: float, radius: float
-) -> tuple[float, float, float, float, float]:
-    """Return depth of a disc at (qx, qy) in the footprint, lever of the contact and its outward normal, world axes."""
-    dx, dy = qx - state[0], qy - state[1]
-    gap, px, py, nx, ny = nearest_edge(outline, c * dx + s * dy + com[0], -s * dx + c * dy + com[1])
-    px, py = px - com[0], py - com[1]
-    return radius - gap, c * px - s * py, s * px + c * py, c * nx - s * ny, s * nx + c * ny
 
 
 @njit(**LEAF, forceinline=True)
@@ -72,7 +61,7 @@ def contacts(
     if p[at.OBSTACLE_STIFFNESS] > 0.0 and p[at.OBSTACLE_ANGLE] > ROUND:
         post_contact(p, outline, state, c, s, com, dt, acc)
     elif p[at.OBSTACLE_STIFFNESS] > 0.0:
-        found = contact(p, outline, state, c, s, com, p[at.OBSTACLE_X], p[at.OBSTACLE_Y], p[at.OBSTACLE_RADIUS])
+        found = disc_contact(outline, state, c, s, com, p[at.OBSTACLE_X], p[at.OBSTACLE_Y], p[at.OBSTACLE_RADIUS])
         depth, rx, ry, nx, ny = found
         if depth > 0.0:
             lean(p, state, rx, ry, nx, ny, depth, dt, acc)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.limit_surface_kernel import Three, inverse, slid, times
-from pbrl_mismatch.kernels.outline_kernel import nearest_edge
+from pbrl_mismatch.kernels.limit_surface_kernel import Six, Three, inverse, slid, times
+from pbrl_mismatch.kernels.outline_kernel import disc_contact, nearest_edge
 from pbrl_mismatch.kernels.state import UNSEEN
 from pbrl_model.kernel import GRAVITY
 
@@ -117,12 +117,11 @@ def reach_of(outline: Array, com: Array) -> float:
 @njit(**LEAF)
 def leant_on(p: Array, outline: Array, state: Array, c: float, s: float, com: Array) -> Pressed:
     """Do what `pressed` does for a round crate, which nothing turns."""
-    dx, dy = state[UNSEEN] - state[0], state[UNSEEN + 1] - state[1]
-    gap, _, _, ex, ey = nearest_edge(outline, c * dx + s * dy + com[0], -s * dx + c * dy + com[1])
-    depth = p[at.UNSEEN_RADIUS] - gap
+    radius, x, y = p[at.UNSEEN_RADIUS], state[UNSEEN], state[UNSEEN + 1]
+    depth, _, _, nx, ny = disc_contact(outline, state, c, s, com, x, y, radius)
     if depth <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    nx, ny, force = c * ex - s * ey, s * ex + c * ey, STIFFNESS * depth
+    force = STIFFNESS * depth
     xx, xy, yy = STIFFNESS * nx * nx, STIFFNESS * nx * ny, STIFFNESS * ny * ny
     return force * nx, force * ny, 0.0, xx, xy, yy, 0.0, 0.0, 0.0
 
@@ -178,6 +177,35 @@ def coasts(p: Array, state: Array, mass: float, inertia: float) -> Three:
     return slid((mass, 0.0, mass, 0.0, 0.0, inertia), x, y, m, p[at.UNSEEN_FORCE], lever, ox, oy)[1]
 
 
+@njit(**LEAF, forceinline=True)
+def driven(
+    p: Array, state: Array, found: Pressed, mass: float, inertia: float, give: float
+) -> tuple[Six, Six, Three, tuple[float, Three, Three]]:
+    """Return how a crate goes beside a body that goes as its twist says and presses on it.
+
+    Args:
+        p: (WIDTH,) parameter row.
+        state: (STATE,).
+        found: what springs press, and their stiffness.
+        mass: of the crate over the step, see `weighed`.
+        inertia: as `mass`.
+        give: time in which contacts answer, with their damping [s].
+
+    Returns:
+        K, what resists closing; A of `slid`; b without what the motion of the body adds; and what `slid` finds.
+    """
+    fx, fy, fm, xx, xy, yy, xm, ym, mm = found
+    qx, qy = state[UNSEEN] - state[0], state[UNSEEN + 1] - state[1]
+    k = (give * xx, give * xy, give * yy, give * xm, give * ym, give * mm)
+    a = (k[0] + mass, k[1], k[2] + mass, k[3], k[4], k[5] + inertia)
+    bx, by = mass * state[UNSEEN + 3] + fx, mass * state[UNSEEN + 4] + fy
+    bm = inertia * state[UNSEEN + 5] + fm
+    px, py, pm = times(k, state[3] - state[5] * qy, state[4] + state[5] * qx, state[5])
+    hx, hy, _ = times(k, state[UNSEEN + 3], state[UNSEEN + 4], state[UNSEEN + 5])
+    lever, ox, oy = footing(p, state, fx + px - hx, fy + py - hy)
+    return k, a, (bx, by, bm), slid(a, bx + px, by + py, bm + pm, p[at.UNSEEN_FORCE], lever, ox, oy)
+
+
 @njit(**LEAF)
 def crate_contact(
     p: Array,
@@ -198,8 +226,9 @@ def crate_contact(
     foreseen under the twist that the body has; if so, its friction stays what it is then, and it goes along with what
     the body does besides as its mass lets it.
     """
-    fx, fy, fm, xx, xy, yy, xm, ym, mm = met(p, outline, state, c, s, com)
-    if xx + yy <= 0.0:
+    found = met(p, outline, state, c, s, com)
+    fx, fy, fm = found[0], found[1], found[2]
+    if found[3] + found[5] <= 0.0:
         return
     # From the body's centre of mass to the crate's middle.
     qx, qy = state[UNSEEN] - state[0], state[UNSEEN + 1] - state[1]
@@ -209,14 +238,7 @@ def crate_contact(
     closing = fx * (vx - omega * qy - w[0]) + fy * (vy + omega * qx - w[1]) + fm * (omega - w[2])
     if fx * fx + fy * fy + STIFFNESS * give * closing <= 0.0:
         return
-    k = (give * xx, give * xy, give * yy, give * xm, give * ym, give * mm)
-    a = (k[0] + heavy, k[1], k[2] + heavy, k[3], k[4], k[5] + turning)
-    bx, by = heavy * state[UNSEEN + 3] + fx, heavy * state[UNSEEN + 4] + fy
-    bm = turning * state[UNSEEN + 5] + fm
-    px, py, pm = times(k, state[3] - state[5] * qy, state[4] + state[5] * qx, state[5])
-    hx, hy, _ = times(k, state[UNSEEN + 3], state[UNSEEN + 4], state[UNSEEN + 5])
-    lever, ox, oy = footing(p, state, fx + px - hx, fy + py - hy)
-    speed, _, r = slid(a, bx + px, by + py, bm + pm, p[at.UNSEEN_FORCE], lever, ox, oy)
+    k, a, (bx, by, bm), (speed, _, r) = driven(p, state, found, heavy, turning, give)
     if speed > 0.0:
         n = inverse(a)
         ux, uy, um = times(n, bx - r[0], by - r[1], bm - r[2])
@@ -258,22 +280,16 @@ def move_crate(
         dt: [s].
         damped: `CRUSHING`, or `FOLLOWING` along a recorded path [s].
     """
-    fx, fy, fm, xx, xy, yy, xm, ym, mm = met(p, outline, state, c, s, com)
+    found = met(p, outline, state, c, s, com)
+    fx, fy, fm = found[0], found[1], found[2]
     mass, inertia = weighed(p, dt)
     w = coasts(p, state, mass, inertia)
-    if xx + yy > 0.0:
+    if found[3] + found[5] > 0.0:
         qx, qy = state[UNSEEN] - state[0], state[UNSEEN + 1] - state[1]
         vx, vy, omega, give = state[3] - state[5] * qy, state[4] + state[5] * qx, state[5], dt + damped
         closing = fx * (vx - w[0]) + fy * (vy - w[1]) + fm * (omega - w[2])
         if fx * fx + fy * fy + STIFFNESS * give * closing > 0.0:
-            k = (give * xx, give * xy, give * yy, give * xm, give * ym, give * mm)
-            a = (k[0] + mass, k[1], k[2] + mass, k[3], k[4], k[5] + inertia)
-            px, py, pm = times(k, vx, vy, omega)
-            hx, hy, _ = times(k, state[UNSEEN + 3], state[UNSEEN + 4], state[UNSEEN + 5])
-            bx, by = mass * state[UNSEEN + 3] + fx + px, mass * state[UNSEEN + 4] + fy + py
-            bm = inertia * state[UNSEEN + 5] + fm + pm
-            lever, ox, oy = footing(p, state, fx + px - hx, fy + py - hy)
-            w = slid(a, bx, by, bm, p[at.UNSEEN_FORCE], lever, ox, oy)[1]
+            w = driven(p, state, found, mass, inertia, give)[3][1]
     for i in range(3):
         state[UNSEEN + 3 + i] = w[i]
         state[UNSEEN + i] += w[i] * dt

@@ -37,3 +37,14 @@ def nearest_edge(outline: Array, bx: float, by: float) -> tuple[float, float, fl
     if not inside and best > 1e-9:
         nx, ny = (bx - px) / best, (by - py) / best
     return (-best if inside else best), px, py, nx, ny
+
+
+@njit(**LEAF)
+def disc_contact(
+    outline: Array, state: Array, c: float, s: float, com: Array, qx: float, qy: float, radius: float
+) -> tuple[float, float, float, float, float]:
+    """Return depth of a disc at (qx, qy) in the footprint, lever of the contact and its outward normal, world axes."""
+    dx, dy = qx - state[0], qy - state[1]
+    gap, px, py, nx, ny = nearest_edge(outline, c * dx + s * dy + com[0], -s * dx + c * dy + com[1])
+    px, py = px - com[0], py - com[1]
+    return radius - gap, c * px - s * py, s * px + c * py, c * nx - s * ny, s * nx + c * ny
