@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from visualization_msgs.msg import MarkerArray
 
 from pbrl_bringup.processes import Programs
+from pbrl_control.ros.conversions import seconds
 from pbrl_control.ros.floor_conversions import odometry_from_msg
 
 LATCHED = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -49,8 +51,12 @@ class Person(Node):
 
     def states(self) -> list[str]:
         """States in their order, each stay once."""
-        states = [status.state for status in self.told]
-        return [state for k, state in enumerate(states) if k == 0 or state != states[k - 1]]
+        return [state for state, _ in groupby(status.state for status in self.told)]
+
+    def story(self) -> list[str]:
+        """What was told, each stay in a state once: with its last sentence, and when that was told."""
+        stays = [list(stay) for _, stay in groupby(self.told, lambda status: status.state)]
+        return [f"{seconds(stay[-1].header.stamp):.1f} s {stay[-1].state}: {stay[-1].sentence}" for stay in stays]
 
     def until(self, condition: Callable[[], Any], what: str) -> None:
         """Let messages come until a condition holds."""
@@ -61,7 +67,7 @@ class Person(Node):
                 heard, last = (len(self.told), len(self.way)), time.monotonic()
             late = self.way and self.way[-1][0] > begin + PATIENCE
             silent = time.monotonic() > last + SILENCE
-            assert not (late or silent), f"{what}: {[(each.state, each.sentence) for each in self.told[-3:]]}"
+            assert not (late or silent), f"{what}: {self.story()}"
             self._spinner.spin_once(timeout_sec=0.05)
             self._programs.check()
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from office_of_fakes import DT, GOAL, SETTINGS, Brain, Office, executive_in, office
 from room_of_fakes import NOMINAL
-from shapely import Point
+from shapely import Point, box
 from tampering import events, known, once
 
 from pbrl_control.kinematics import RobotKinematics
@@ -89,6 +89,30 @@ def test_what_nobody_sees_is_gone_round_once_it_was_struck_and_forgotten_with_th
     executive.aim(np.array([-2.5, -1.5, 1.0]))
     world.tick(executive)
     assert not executive.view.around.struck.outlines
+
+
+def test_what_was_felt_where_nothing_is_is_doubted_before_the_goal_is_given_up(kinematics: RobotKinematics) -> None:
+    world = office(kinematics, things={}, bodies={}, fixed={})
+    executive = executive_in(world)
+    executive.view.around.struck.outlines = {"something unseen 1": box(-0.1, -2.9, 0.1, 2.9)}
+    assert world.run(executive).state == State.DONE
+    assert events(executive).count(Event.DOUBTED) == 1
+    assert executive.mission.account.plans == 2
+    (doubt,) = [change.sentence for change in executive.mission.account.log if change.event == Event.DOUBTED]
+    assert doubt.startswith("no way to the goal: ")
+    assert doubt.endswith("; planned anew without something unseen 1, which only the base has felt")
+
+
+def test_what_is_felt_again_is_believed(kinematics: RobotKinematics) -> None:
+    world = office(kinematics, things={}, bodies={}, fixed={})
+    world.unseen = box(-0.1, -2.9, 0.1, 2.9)
+    executive = executive_in(world)
+    executive.view.around.struck.outlines = {"something unseen 1": world.unseen}
+    order = world.run(executive)
+    assert order.state == State.FAILED
+    assert order.status.startswith("no way to the goal: ")
+    assert events(executive).count(Event.DOUBTED) == 1
+    assert executive.view.around.struck.outlines, "and stays on the map"
 
 
 def test_an_empty_room_is_driven_through(kinematics: RobotKinematics) -> None:

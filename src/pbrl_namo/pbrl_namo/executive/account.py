@@ -12,6 +12,9 @@ from pbrl_namo.executive.table import MOVING, THINKING, Event, State
 SURPRISES = frozenset({Event.UNEXPECTED_FORCE, Event.STALLED, Event.TIMED_OUT, Event.GRIP_SLIPPED})
 """What a model did not foretell."""
 
+PLANS = frozenset({Event.PLANNED, Event.NOTHING_TO_DO, Event.NO_WAY, Event.DOUBTED})
+"""What a plan comes to."""
+
 FAILURES = SURPRISES | {
     Event.NO_GRASP,
     Event.WAY_LOST,
@@ -90,7 +93,7 @@ class Account:
         """Take in a change of state."""
         self.log.append(change)
         event = change.event
-        if change.before == State.PLANNING and event in (Event.PLANNED, Event.NOTHING_TO_DO, Event.NO_WAY):
+        if change.before == State.PLANNING and event in PLANS:
             self.plans += 1
         self.surprises += event in SURPRISES
         self.updates += event in (Event.UPDATED, Event.UNEXPLAINED)

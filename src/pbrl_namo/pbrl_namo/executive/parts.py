@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -91,7 +92,7 @@ class Parts:
         job: Job
         take: Callable[[Answer], Step]
         if state == State.PLANNING:
-            job, take, what, timeout = mission.plan_job(now, view), mission.take_plan, "a plan", jobs.plan
+            job, take, what, timeout = mission.plan_job(now, view), partial(self._planned, mission), "a plan", jobs.plan
         elif state == State.GET_GRASP_POINT:
             job, take, what, timeout = mission.grasp_job(now, view), mission.take_grasp, "a grasp", jobs.grasp
         elif state == State.UPDATE_MODEL:
@@ -100,6 +101,20 @@ class Parts:
             job, take, what, timeout = mission.mismatch_job(), mission.take_mismatch, "a diagnosis", jobs.mismatch
         phase = Phase.SETTLE if state in MAY_HOLD else Phase.LOCATE
         return Asking(Question(self._thinker, job, timeout, self._settings.jobs), take, what, phase)
+
+    def _planned(self, mission: Mission, answer: Answer) -> Step:
+        """Return what comes of a plan; where none leads past what nobody sees, that is doubted, once a goal.
+
+        The base may have been held up by nothing: wheels that slipped, commands that came late. If it is there, it
+        stops the base again.
+        """
+        step, struck = mission.take_plan(answer), self._view.around.struck
+        if step.event != Event.NO_WAY or not struck.outlines or mission.doubted:
+            return step
+        unseen = " and ".join(struck.outlines)
+        mission.doubted = True
+        struck.forget()
+        return Step(f"{step.status}; planned anew without {unseen}, which only the base has felt", Event.DOUBTED)
 
     def _manipulation(self, now: float, mission: Mission) -> Manipulation:
         move, candidate, check = mission.planned.move, mission.grasp.candidate, self._opening

@@ -45,6 +45,7 @@ class Event(StrEnum):
     PLANNED = "planned"
     NOTHING_TO_DO = "nothing in the way"
     NO_WAY = "no way"
+    DOUBTED = "no way past what nobody sees"
     GRASP_FOUND = "grasp found"
     NO_GRASP = "no grasp found"
     ARRIVED = "arrived"
@@ -89,6 +90,8 @@ TABLE: Mapping[tuple[State, Event], State] = {
     (State.PLANNING, Event.PLANNED): State.GET_GRASP_POINT,
     (State.PLANNING, Event.NOTHING_TO_DO): State.DRIVE_TO_GOAL,
     (State.PLANNING, Event.NO_WAY): State.FAILED,
+    # What the base was held up by once need not be a thing: it is looked for without, once a goal.
+    (State.PLANNING, Event.DOUBTED): State.LOOK,
     (State.PLANNING, Event.JOB_LOST): State.FAILED,
     (State.GET_GRASP_POINT, Event.GRASP_FOUND): State.NAVIGATE,
     (State.GET_GRASP_POINT, Event.NO_GRASP): State.LOOK,
