@@ -9,7 +9,7 @@ from pbrl_mismatch.kernels.crate_kernel import ROUND
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
     """Return what is believed of its parameters."""
     return (
-        positive("unseen_force", 0.5 * scene.force, 0.8),
+        positive("unseen_force", 0.5 * scene.force, 1.2),
         plain("unseen_x", float(scene.middle[0]), float(scene.reach[0])),
         plain("unseen_y", float(scene.middle[1]), float(scene.reach[1])),
         positive("unseen_radius", 0.15, 0.5),

@@ -12,9 +12,9 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         plain("bias_y", 0.0, 4.0),
         plain("bias_torque", 0.0, 1.0),
         plain("bias_start", scene.start + 0.4 * scene.seconds, 0.3 * scene.seconds),
-        plain("drift_x", 0.0, 0.2),
-        plain("drift_y", 0.0, 0.2),
-        plain("drift_torque", 0.0, 0.05),
+        plain("drift_x", 0.0, 0.3),
+        plain("drift_y", 0.0, 0.3),
+        plain("drift_torque", 0.0, 0.075),
     )
 
 
