@@ -19,8 +19,8 @@ evidence gained, is not named."""
 DISCREPANCY = 0.04
 """Share of what a law explains that its being wrong may leave for others to explain."""
 CLEAR = 5.0
-"""One effect more has to be likelier by more [nat], very strong evidence (Kass and Raftery 1995): some twenty are tried,
-on laws that are all a little wrong."""
+"""One effect more has to be likelier by more [nat], very strong evidence (Kass and Raftery 1995): some twenty are
+tried, on laws that are all a little wrong."""
 REFINED = 0.01
 """Share of what a law explains that a law of which it is a limit has to explain beyond it."""
 JUDGED = 3
