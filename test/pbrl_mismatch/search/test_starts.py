@@ -13,15 +13,18 @@ import pytest
 from pbrl_bag.types import Recording
 from pbrl_mismatch import DiagnoseOptions, track_of
 from pbrl_mismatch.data.cuts import cut_windows
+from pbrl_mismatch.effects.effect import Scene
+from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.search.fitted import cut_stages, fit_from
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.path.ground import ground_of
-from pbrl_mismatch.search.path.starts import each_first, starts_of
+from pbrl_mismatch.search.path.starts import ELSEWHERE, each_first, going_on, starts_of
 
 OPTIONS = DiagnoseOptions()
 BIAS = np.array([0.4, 3.0, 0.2])
 """Of the sensor, in its own axes [N, N, N m]."""
 ONSET = 1
+SCENE = Scene(np.zeros(2), np.ones(2), np.zeros(2), np.array([0.6, 0.35]), 20.0, 10.0, 0.1, 0.0, 30.0)
 
 
 @pytest.fixture(scope="module")
@@ -60,3 +63,22 @@ def test_each_group_s_likeliest_come_first_and_all_others_after() -> None:
         assert set(order[: len(counts)].tolist()) == leads
         for part in (order[: len(counts)], order[len(counts) :]):
             assert np.all(np.diff(evidence[part]) <= 0.0)
+
+
+def test_borders_go_on_from_the_likeliest_and_from_another_place() -> None:
+    free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.02), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    effect, rng = EFFECTS["floor_patch"], np.random.default_rng(5)
+    hypothesis = free.with_effect(effect, SCENE, 0)
+    x, y = (hypothesis.columns.index(column) for column in ("patch_x", "patch_y"))
+    draws = hypothesis.sample_prior(rng, 60)
+    draws[:, [x, y]] = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 3.0]]).repeat(20, axis=0)
+    draws[:, [x, y]] += rng.uniform(-0.1, 0.1, (60, 2))
+    assert going_on(draws, hypothesis, effect, 2).tolist() == [0, 1, 20]
+    assert going_on(draws[:20], hypothesis, effect, 2).tolist() == [0, 1], "there is no other place"
+    mixed = draws[rng.permutation(60)]
+    *likeliest, elsewhere = mixed[going_on(mixed, hypothesis, effect, 1)][:, [x, y]]
+    assert min(np.hypot(*(each - elsewhere)) for each in likeliest) > ELSEWHERE
+    bias = EFFECTS["wrench_bias"]
+    laid = free.with_effect(bias, SCENE, ONSET)
+    same = laid.sample_prior(rng, 4).repeat(2, axis=0)
+    assert going_on(same, laid, bias, 3).tolist() == [0, 2, 4], "what has no borders is told by all its columns"

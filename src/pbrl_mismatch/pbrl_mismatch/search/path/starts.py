@@ -12,7 +12,7 @@ from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_mismatch.search.fitted import Fitted, apart, scene_of
+from pbrl_mismatch.search.fitted import Fitted, apart_rows, scene_of
 from pbrl_mismatch.search.hypothesis import BENT, OF_FRICTION, Hypothesis
 from pbrl_mismatch.search.path.climb import PathPeak, climb_along
 from pbrl_mismatch.search.path.contacts import contact_points, with_contacts
@@ -34,6 +34,9 @@ PARENTS, NEARBY = 3, (0.15, 0.04)
 what is met, or missed by a centimetre."""
 BEGUN, CLIMBED = 3, 8
 """Steps along the path of all starts of a hypothesis, and of the best of them."""
+ELSEWHERE = 0.4
+"""What has borders goes on from the best so far from the likeliest as well [m]: of a misfit how far a draw is from its
+top says more than its place."""
 
 
 def starts_of(
@@ -56,7 +59,7 @@ def starts_of(
     searched = _searched(effect, variant)
     # Edges in time and borders are met by few draws and felt from nearby only: the best ones are drawn about again.
     for nearby in (NEARBY if effect.touches is not None else NEARBY[:1]) if searched else ():
-        parents = np.concatenate([_first_of(misfit, half) for half in (~afresh, afresh)])
+        parents = np.concatenate([_first_of(ranked, misfit, half, hypothesis, effect) for half in (~afresh, afresh)])
         parents = np.resize(parents, len(draws))
         moved = np.isin(hypothesis.columns, searched) * nearby * hypothesis.spread
         near = hypothesis.believable(ranked[parents] + moved * rng.standard_normal((len(draws), len(moved))))
@@ -64,11 +67,12 @@ def starts_of(
         ranked, misfit = np.concatenate([ranked, again]), np.concatenate([misfit, rest])
         afresh = np.concatenate([afresh, afresh[parents]])
     halves = [half for half in (~afresh, afresh) if half.any()]
-    starts = [_best_of(ranked, misfit, half, hypothesis, options) for half in halves]
+    starts = [_best_of(ranked, misfit, half, hypothesis, effect, options) for half in halves]
     along = ground.climbed if effect.remembers else ground.first.along
     begun = climb_along(along, hypothesis, np.concatenate(starts), BEGUN)
     best = begun.coordinates[each_first(begun.evidence, [len(each) for each in starts])]
-    return climb_along(ground.climbed, hypothesis, apart(best, hypothesis.spread, options.keep[0]), CLIMBED)
+    kept = best[going_on(best, hypothesis, effect, options.keep[0])]
+    return climb_along(ground.climbed, hypothesis, kept, CLIMBED)
 
 
 def _searched(effect: Effect, variant: int) -> list[str]:
@@ -148,10 +152,25 @@ def _placed(
     return draws
 
 
-def _first_of(misfit: Array, among: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the rows of the least misfits among some."""
+def going_on(draws: Array, hypothesis: Hypothesis, effect: Effect, count: int) -> NDArray[np.int64]:
+    """Return which draws (n, K), likeliest first, to go on from: so many apart, of borders one elsewhere too."""
+    kept = apart_rows(draws, hypothesis.spread, count)
+    if effect.region is None:
+        return kept
+    x, y = draws[:, [hypothesis.columns.index(column) for column in effect.region[:2]]].T
+    away = np.min(np.hypot(x[:, None] - x[kept], y[:, None] - y[kept]), axis=1)
+    return np.concatenate([kept, np.flatnonzero(away > ELSEWHERE)[:1]])
+
+
+def _first_of(
+    draws: Array, misfit: Array, among: NDArray[np.bool_], hypothesis: Hypothesis, effect: Effect
+) -> NDArray[np.int64]:
+    """Return the rows of the draws to draw about again, among some."""
     rows = np.flatnonzero(among)
-    return np.asarray(rows[np.argsort(misfit[rows], kind="stable")][:PARENTS], dtype=np.int64)
+    rows = rows[np.argsort(misfit[rows], kind="stable")]
+    if effect.region is not None:
+        return np.asarray(rows[going_on(draws[rows], hypothesis, effect, PARENTS)], dtype=np.int64)
+    return np.asarray(rows[:PARENTS], dtype=np.int64)
 
 
 def each_first(evidence: Array, counts: Sequence[int]) -> NDArray[np.int64]:
@@ -167,8 +186,13 @@ def each_first(evidence: Array, counts: Sequence[int]) -> NDArray[np.int64]:
 
 
 def _best_of(
-    draws: Array, misfit: Array, among: NDArray[np.bool_], hypothesis: Hypothesis, options: DiagnoseOptions
+    draws: Array,
+    misfit: Array,
+    among: NDArray[np.bool_],
+    hypothesis: Hypothesis,
+    effect: Effect,
+    options: DiagnoseOptions,
 ) -> Array:
     """Return the best draws among some of them."""
-    order = np.argsort(misfit[among], kind="stable")
-    return apart(draws[among][order], hypothesis.spread, -(-options.candidates // 2))
+    best = draws[among][np.argsort(misfit[among], kind="stable")]
+    return np.asarray(best[going_on(best, hypothesis, effect, -(-options.candidates // 2))])
