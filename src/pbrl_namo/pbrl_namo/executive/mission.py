@@ -51,7 +51,6 @@ class Mission:
         grasp: the last grasp that was found.
         manipulation: the one under way, or the last.
         been: poses (3,) by object from which it was to be moved [m, rad].
-        doubted: whether what nobody sees, but the base was stopped by, has been forgotten as no way led past it.
         vanished: things that are taken to stand where they were last seen.
         surprised: when something last happened to a manipulation, what has ended it for instance [s]; NaN: never.
 
@@ -67,7 +66,6 @@ class Mission:
         self.planned = PlanAnswer()
         self.grasp = GraspAnswer()
         self.manipulation: Manipulation | None = None
-        self.doubted = False
         self.vanished: tuple[str, ...] = ()
         self._settings, self._seed = settings, seed
         self.surprised = math.nan

@@ -109,10 +109,10 @@ class Parts:
         stops the base again.
         """
         step, struck = mission.take_plan(answer), self._view.around.struck
-        if step.event != Event.NO_WAY or not struck.outlines or mission.doubted:
+        doubted = any(change.event == Event.DOUBTED for change in mission.account.log)
+        if step.event != Event.NO_WAY or not struck.outlines or doubted:
             return step
         unseen = " and ".join(struck.outlines)
-        mission.doubted = True
         struck.forget()
         return Step(f"{step.status}; planned anew without {unseen}, which only the base has felt", Event.DOUBTED)
 

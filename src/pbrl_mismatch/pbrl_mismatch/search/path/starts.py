@@ -59,15 +59,16 @@ def starts_of(
     searched = _searched(effect, variant)
     # Edges in time and borders are met by few draws and felt from nearby only: the best ones are drawn about again.
     for nearby in (NEARBY if effect.touches is not None else NEARBY[:1]) if searched else ():
-        parents = np.concatenate([_first_of(ranked, misfit, half, hypothesis, effect) for half in (~afresh, afresh)])
-        parents = np.resize(parents, len(draws))
+        orders = [_in_order(misfit, half) for half in (~afresh, afresh)]
+        likely = np.concatenate([order[_parents(ranked[order], hypothesis, effect)] for order in orders])
+        parents = np.resize(likely, len(draws))
         moved = np.isin(hypothesis.columns, searched) * nearby * hypothesis.spread
         near = hypothesis.believable(ranked[parents] + moved * rng.standard_normal((len(draws), len(moved))))
         again, rest = screen(ground, hypothesis, effect, near)
         ranked, misfit = np.concatenate([ranked, again]), np.concatenate([misfit, rest])
         afresh = np.concatenate([afresh, afresh[parents]])
-    halves = [half for half in (~afresh, afresh) if half.any()]
-    starts = [_best_of(ranked, misfit, half, hypothesis, effect, options) for half in halves]
+    halves = [ranked[_in_order(misfit, half)] for half in (~afresh, afresh) if half.any()]
+    starts = [half[going_on(half, hypothesis, effect, -(-options.candidates // 2))] for half in halves]
     along = ground.climbed if effect.remembers else ground.first.along
     begun = climb_along(along, hypothesis, np.concatenate(starts), BEGUN)
     best = begun.coordinates[each_first(begun.evidence, [len(each) for each in starts])]
@@ -162,15 +163,17 @@ def going_on(draws: Array, hypothesis: Hypothesis, effect: Effect, count: int) -
     return np.concatenate([kept, np.flatnonzero(away > ELSEWHERE)[:1]])
 
 
-def _first_of(
-    draws: Array, misfit: Array, among: NDArray[np.bool_], hypothesis: Hypothesis, effect: Effect
-) -> NDArray[np.int64]:
-    """Return the rows of the draws to draw about again, among some."""
-    rows = np.flatnonzero(among)
-    rows = rows[np.argsort(misfit[rows], kind="stable")]
+def _parents(draws: Array, hypothesis: Hypothesis, effect: Effect) -> NDArray[np.int64]:
+    """Return which draws (n, K), likeliest first, are drawn about again."""
     if effect.region is not None:
-        return np.asarray(rows[going_on(draws[rows], hypothesis, effect, PARENTS)], dtype=np.int64)
-    return np.asarray(rows[:PARENTS], dtype=np.int64)
+        return going_on(draws, hypothesis, effect, PARENTS)
+    return np.arange(min(PARENTS, len(draws)))
+
+
+def _in_order(misfit: Array, among: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the rows of some draws, likeliest first."""
+    rows = np.flatnonzero(among)
+    return np.asarray(rows[np.argsort(misfit[rows], kind="stable")], dtype=np.int64)
 
 
 def each_first(evidence: Array, counts: Sequence[int]) -> NDArray[np.int64]:
@@ -183,16 +186,3 @@ def each_first(evidence: Array, counts: Sequence[int]) -> NDArray[np.int64]:
     _, leads = np.unique(group[order], return_index=True)
     behind = np.isin(np.arange(len(order)), leads, invert=True)
     return np.asarray(order[np.argsort(behind, kind="stable")], dtype=np.int64)
-
-
-def _best_of(
-    draws: Array,
-    misfit: Array,
-    among: NDArray[np.bool_],
-    hypothesis: Hypothesis,
-    effect: Effect,
-    options: DiagnoseOptions,
-) -> Array:
-    """Return the best draws among some of them."""
-    best = draws[among][np.argsort(misfit[among], kind="stable")]
-    return np.asarray(best[going_on(best, hypothesis, effect, -(-options.candidates // 2))])
