@@ -60,6 +60,19 @@ def test_a_cord_acts_where_it_is_taut(track: Any) -> None:
     assert found[away < slack - 0.02].mean() < 0.1  # pauses that are bridged
 
 
+def test_friction_that_breaks_away_acts_where_feet_are_slow_and_leaves_sliding_friction_on(track: Any) -> None:
+    row = table_row(slide_mu=0.1, breakaway_mu=0.05, breakaway_speed=0.02)
+    found = inside(track, activity(track, row, ["breakaway_friction"])["breakaway_friction"] or ())
+    turns = np.exp(1j * track.seen[:, 2:3]) * ((track.feet - track.body[1:3]) @ [1.0, 1j])
+    speed = np.abs(track.seen[:, 3:4] + 1j * track.seen[:, 4:5] + 1j * track.seen[:, 5:6] * turns)
+    fast = (speed > 0.05).all(axis=1)  # 0.2 % of the excess is left there
+    assert fast.any() and found[fast].mean() < 0.1  # pauses that are bridged
+    assert found[((speed > 0.005) & (speed < 0.02)).all(axis=1)].all()
+    off = without(track, row, "breakaway_friction")
+    assert off[COLUMN["breakaway_mu"]] == 0.0 and off[COLUMN["slide_mu"]] == 0.1
+    assert without(track, row, "ground_friction")[COLUMN["slide_mu"]] == 0.0
+
+
 def test_each_effect_of_two_is_asked_alone(track: Any) -> None:
     row = table_row(steady_x=2.0, slope_x=0.01)
     sizes = wrench_sizes(track, row, ["external_force", "floor_slope"])

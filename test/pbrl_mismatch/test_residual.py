@@ -10,7 +10,7 @@ import pytest
 
 from pbrl_bag.types import Recording
 from pbrl_mismatch import MismatchError, residual_wrench, track_of
-from pbrl_mismatch.data.residual import accelerations
+from pbrl_mismatch.data.residual import MEMORIES, MEMORY, accelerations
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 
 MASS = 20.0
@@ -103,6 +103,21 @@ def test_accelerations_are_the_kernel_s(track: Any) -> None:
     rows = np.stack([table_row(), table_row(steady_x=2.0)])
     found = accelerations(track, rows, track.seen, 5)
     np.testing.assert_allclose(found[1] - found[0], np.broadcast_to([0.1, 0.0, 0.0], found[0].shape), atol=1e-9)
+
+
+def test_what_is_steady_is_remembered_for_longest_and_a_moment_s_push_is_not(track: Any) -> None:
+    steady, short = (
+        table_row(steady_x=0.6),
+        table_row(steady_x=4.0, force_start=track.clock[400], force_end=track.clock[420]),
+    )
+    memory = {m: residual_wrench(track, steady, memory=m) for m in MEMORIES}
+    found = residual_wrench(track, steady, memory=None)
+    assert found.log_likelihood == max(each.log_likelihood for each in memory.values())
+    np.testing.assert_array_equal(found.world, memory[max(MEMORIES)].world)
+    np.testing.assert_array_equal(
+        residual_wrench(track, short, memory=None).world, residual_wrench(track, short, memory=min(MEMORIES)).world
+    )
+    assert np.median(found.significance) > 2.0 * np.median(memory[MEMORY].significance)
 
 
 @pytest.mark.parametrize("options", [{"size": 0.0}, {"size": np.nan}, {"memory": -1.0}])

@@ -13,7 +13,7 @@ import pytest
 from pbrl_bag.types import Recording
 from pbrl_mismatch import MismatchError, residual_wrench, track_of
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
-from pbrl_mismatch.unknown.describe import describe_unknown
+from pbrl_mismatch.unknown.describe import describe_unknown, surely_there
 from pbrl_mismatch.unknown.features import along_motion, features_of
 from pbrl_mismatch.unknown.process import wrench_process
 from pbrl_mismatch.unknown.regression import sparse_law
@@ -90,6 +90,18 @@ def test_where_nothing_is_left_out_no_law_is_named(track: Any) -> None:
         assert not sparse_law(np.random.default_rng(0), chance, features_of(chance)).terms
 
 
+def test_what_has_no_name_is_surely_there_while_it_acts_however_long_that_is(track: Any) -> None:
+    def there(row: np.ndarray) -> np.ndarray:
+        when = surely_there(track, residual_wrench(track, row, memory=None))
+        return np.any([(track.clock >= a) & (track.clock < b) for a, b in when] or [0.0 * track.clock > 1.0], axis=0)
+
+    assert there(table_row(steady_x=0.6)).mean() > 0.8  # of 0.4 s alone, half a newton is next to the noise
+    assert there(table_row()).mean() < 0.02
+    begins = float(track.clock[len(track.clock) // 2])
+    found = there(table_row(steady_x=2.0, force_start=begins))
+    assert found[track.clock > begins].mean() > 0.8 and found[track.clock < begins].mean() < 0.2
+
+
 def test_a_region_is_told_by_its_border() -> None:
     here = moments(np.random.default_rng(1), 150, 0.4)
     border = float(np.quantile(here.place[:, 0], 0.5))
@@ -142,7 +154,7 @@ def test_the_report_is_json_and_the_same_seed_gives_the_same(track: Any) -> None
     )
     assert first == second
     told = json.loads(first)
-    assert set(told) == {"sentences", "terms", "share_explained", "left_over", "gaussian_process", "notes"}
+    assert set(told) == {"sentences", "terms", "share_explained", "left_over", "gaussian_process", "when", "notes"}
     assert "against the direction of motion" in told["sentences"][0] and "N s/m" in told["sentences"][0]
 
 

@@ -86,10 +86,15 @@ def wrench_sizes(track: Track, row: Array, effects: Sequence[str]) -> dict[str, 
 
 
 def without(track: Track, row: Array, effect: str) -> Array:
-    """Return (WIDTH,) a model's row with one of its effects off, all else as it was fitted."""
-    known = effect_named(effect)
-    columns = {parameter.column for parameter in known.parameters(scene_of(track, row))}
+    """Return (WIDTH,) a model's row with one of its effects off, all else as it was fitted.
+
+    One that adds to another, as what holds at rest does to sliding friction, leaves the other on.
+    """
+    known, scene = effect_named(effect), scene_of(track, row)
+    columns = {parameter.column for parameter in known.parameters(scene)}
     columns.update(known.fixed, *known.fixed_in.values())
+    if known.limit is not None:
+        columns -= {parameter.column for parameter in effect_named(known.limit).parameters(scene)}
     off, neutral = row.copy(), neutral_row()
     for column in columns:
         off[COLUMN[column]] = neutral[COLUMN[column]]

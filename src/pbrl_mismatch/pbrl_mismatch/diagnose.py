@@ -261,7 +261,7 @@ def _diagnose_object(
         weighed = (replace(weighed[0], fitted=likeliest), *weighed[1:])
     scene, rng = scene_of(track, baseline.row), np.random.default_rng(third)
     found = findings_of(baseline, weighed, scene, exact=told is None)
-    residual = residual_wrench(track, baseline.row)
+    residual = residual_wrench(track, baseline.row, memory=None)
     floor = noise_floor(stages.split.told) if stages.split is not None else (math.nan, math.nan)
     named = found.effects[0].fitted if found.effects else baseline
     left = _unexplained(baseline, weighed[0].fitted if weighed else baseline)

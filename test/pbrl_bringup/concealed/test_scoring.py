@@ -14,7 +14,7 @@ from scipy.stats import binomtest
 
 from pbrl_bringup.benches.concealed_figures import confusion, draw_all
 from pbrl_bringup.benches.concealed_rows import interval, mean_interval, median_interval, rows_of
-from pbrl_bringup.concealed.localisation import Localised, f1, localise
+from pbrl_bringup.concealed.localisation import Localised, claimed_by_report, f1, localise
 from pbrl_bringup.concealed.places import border_error, moment_error, parameter_bias, place_error
 from pbrl_bringup.concealed.scoring import (
     Comparison,
@@ -114,6 +114,15 @@ def test_a_claim_that_is_the_truth_scores_one_and_nothing_claimed_scores_nothing
     )
     half = localise(truth, samples, regimes, samples.inside([(10.0, 14.9)]))
     assert half.time == pytest.approx(2 / 3, abs=0.02) and half.overlap == pytest.approx(0.5, abs=0.02)
+
+
+def test_what_has_no_name_is_claimed_when_it_is_surely_there() -> None:
+    samples = walk()
+    nothing = report([], [])["objects"]["table"]
+    described = nothing | {"unknown_description": {"when": [[10.0, 20.0]]}}
+    claimed, outlines = claimed_by_report(described, samples)
+    np.testing.assert_array_equal(claimed, samples.inside([(10.0, 20.0)]))
+    assert not outlines and not claimed_by_report(nothing, samples)[0].any()
 
 
 def test_the_border_is_compared_where_it_was_crossed() -> None:

@@ -122,10 +122,11 @@ def _on_cells(samples: Samples, regimes: Regimes, outlines: Sequence[Array]) -> 
 def claimed_by_report(found: Mapping[str, Any], samples: Samples) -> tuple[Mask, list[Array]]:
     """Return the samples (n,) and the floor outlines that one object's part of a report claims.
 
-    An effect without times acts always; one that is a region of the floor claims its outline. Where nothing is named,
-    nothing is claimed.
+    An effect without times acts always; one that is a region of the floor claims its outline. Of what has no name those
+    times are claimed at which it is surely there.
     """
-    claimed, outlines = samples.inside([]), []
+    described = found.get("unknown_description") or {}
+    claimed, outlines = samples.inside([(a, b) for a, b in described.get("when", [])]), []
     for each in found["effects"]:
         intervals: list[Interval] | None = each.get("when")
         claimed |= np.ones_like(claimed) if intervals is None else samples.inside([(a, b) for a, b in intervals])

@@ -31,7 +31,7 @@ class Part:
         replay: data of the replay as JSON.
         repaired: whether there is a repaired model beside the baseline.
         places: whether what is named has a place.
-        moments: whether it acts for a part of the time.
+        moments: whether it acts for a part of the time, or is surely there without a name.
         stretch: length of what is simulated at a time [s].
         floor: figure, an SVG element, and so are the next three.
         over_time: see `figures`.

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bag.types import Recording
+from pbrl_bringup.diagnosis.told import acting_times
 from pbrl_mismatch.data.cuts import Cuts, cut_windows, held_out_blocks, inside
 from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.diagnose import ObjectDiagnosis
@@ -44,7 +45,7 @@ class Replay:
         held_out: intervals of time that are left out where errors are scored [s].
         seconds: length of a stretch [s].
         places: of named effects: name, whether it moves with the body, outline [m].
-        moments: intervals in which named effects act [s].
+        moments: intervals in which named effects act, or what has no name is surely there [s].
         room: corners of the room [m], or none.
         noise: of recorded positions [m].
     """
@@ -134,7 +135,7 @@ def replay_of(recording: Recording, found: ObjectDiagnosis, options: DiagnoseOpt
         held_out=_held_out(cuts, options, origin),
         seconds=options.block,
         places=tuple(_places(effects, track.object)),
-        moments=tuple((a - origin, b - origin) for entry in effects for a, b in entry.get("when") or []),
+        moments=tuple((start - origin, end - origin) for start, end in acting_times(found.report)),
         room=np.empty((0, 2)) if recording.room is None else np.asarray(recording.room, dtype=float),
         noise=noise_floor(cuts)[0],
     )

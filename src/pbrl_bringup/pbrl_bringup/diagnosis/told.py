@@ -42,6 +42,16 @@ def told_of_all(report: Mapping[str, Any]) -> Told:
     return found
 
 
+def acting_times(report: Mapping[str, Any]) -> list[tuple[float, float]]:
+    """Return when what is named on an object acts, or when what has no name is surely there [s].
+
+    Args:
+        report: as of `told_of_object`.
+    """
+    entries = [*report.get("effects", []), report.get("unknown_description") or {}]
+    return [(start, end) for entry in entries for start, end in entry.get("when") or []]
+
+
 def experiment(entry: Mapping[str, Any]) -> str:
     """Say a proposed push in a sentence."""
     x, y = entry["contact_point"]

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 MEMORY = 0.4
 """Time in which a left-out wrench forgets itself [s]: a contact's, a border's; steady ones are no worse for it."""
+MEMORIES = (MEMORY, 1.5, 5.0)
+"""Those that are tried where none is told: what lasts for a push, or is steady, is lost in the noise of a short one."""
 SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 """Sizes of the left-out force that are tried [N]."""
 SMALL = 1
@@ -78,7 +80,7 @@ class ResidualWrench:
 
 
 def residual_wrench(
-    track: Track, row: Array, *, size: float | None = None, memory: float = MEMORY, stride: int = 1
+    track: Track, row: Array, *, size: float | None = None, memory: float | None = MEMORY, stride: int = 1
 ) -> ResidualWrench:
     """Estimate what a model leaves out.
 
@@ -86,7 +88,7 @@ def residual_wrench(
         track: what was recorded.
         row: (WIDTH,) parameter row of the model.
         size: of the left-out force [N]; None: the likeliest of `SIZES`.
-        memory: time in which it forgets itself [s].
+        memory: time in which it forgets itself [s]; None: the likeliest of `MEMORIES`.
         stride: every so many poses are used.
 
     Raises:
@@ -94,9 +96,12 @@ def residual_wrench(
     """
     if row.shape != (WIDTH,):
         raise MismatchError(f"residual: expected a row of {WIDTH} columns, got shape {row.shape}")
-    for what, value in (("size", 1.0 if size is None else size), ("memory", memory)):
+    for what, value in (("size", 1.0 if size is None else size), ("memory", 1.0 if memory is None else memory)):
         if not (math.isfinite(value) and value > 0.0):
             raise MismatchError(f"residual: expected a {what} above zero, got {value}")
+    if memory is None:
+        each = (residual_wrench(track, row, size=size, memory=memory, stride=stride) for memory in MEMORIES)
+        return max(each, key=lambda found: found.log_likelihood)
     if size is None:
         size = _likeliest_size(track, row, memory, stride)
     mean, spread, value = _smooth(track, row, size, memory, stride, back=True)

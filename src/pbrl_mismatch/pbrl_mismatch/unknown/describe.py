@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
-from pbrl_mismatch.data.residual import ResidualWrench
+from pbrl_mismatch.activity import Interval, intervals
+from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.unknown.features import features_of
 from pbrl_mismatch.unknown.process import WrenchProcess, wrench_process
@@ -22,6 +24,8 @@ STABLE = 0.5
 """A term that is chosen from fewer random halves of the recording is told with a warning."""
 PREDICTS = 0.2
 """A process that predicts less than this share of the wrench says nothing of where it is."""
+SURE = math.sqrt(float(chi2.ppf(0.95, 3)) / 3.0)
+"""What noise alone reaches at one moment of twenty, as `ResidualWrench.significance` counts."""
 COVERS = 0.5
 """Quantile of the distance between moments; a length above it means that the wrench hardly depends on it."""
 
@@ -33,12 +37,14 @@ class UnknownDescription:
     Attributes:
         law: a combination of few physical features.
         process: over place, heading and velocity.
+        when: (start, end) in which it is surely there [s].
         sentences: the same for people, the most important first.
         notes: what must not be read into it.
     """
 
     law: SparseLaw
     process: WrenchProcess
+    when: tuple[Interval, ...]
     sentences: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -50,6 +56,7 @@ class UnknownDescription:
             "share_explained": self.law.share,
             "left_over": {"value": self.law.left_over, "unit": "N"},
             "gaussian_process": self.process.to_report(),
+            "when": [list(each) for each in self.when],
             "notes": list(self.notes),
         }
 
@@ -62,13 +69,15 @@ def describe_unknown(
     Args:
         rng: draws halves of the recording.
         track: what was recorded.
-        residual: under the model.
+        residual: under the model, with the memory that is likeliest.
         row: (WIDTH,) of the model.
         floor: size of the wrist sensor's own error [N].
 
     Raises:
         MismatchError: the recording is too short.
     """
+    when = surely_there(track, residual, floor)
+    residual = residual_wrench(track, row)  # a law is told by how it changes: the wrench is followed wherever it goes
     rows = apart(track)
     every = samples_of(track, residual)
     moments, features = every.take(rows), features_of(every)
@@ -78,7 +87,24 @@ def describe_unknown(
     sentences = [*(_term_sentence(term) for term in law.terms), *_placed(process, moments)]
     if not sentences:
         sentences = [f"a wrench of about {_size(moments):.1f} N without a law that could be told"]
-    return UnknownDescription(law, process, tuple(sentences), tuple(_notes(law, process)))
+    if when:
+        held, there = len(track.clock) * track.dt, sum(end - start for start, end in when)
+        sentences.append(f"it is surely there for {there:.0f} s of the {held:.0f} s in which the object was held")
+    return UnknownDescription(law, process, when, tuple(sentences), tuple(_notes(law, process)))
+
+
+def surely_there(track: Track, residual: ResidualWrench, floor: float = FLOOR) -> tuple[Interval, ...]:
+    """Return when a left-out wrench is told from none with 95 %, as intervals (start, end) [s] in order.
+
+    Where it is not, it may be there still, and too small to be told.
+
+    Args:
+        track: what was recorded.
+        residual: under a model.
+        floor: size of the wrist sensor's own error [N].
+    """
+    size = np.linalg.norm(residual.world / [1.0, 1.0, track.gyration], axis=1)
+    return intervals(track, (residual.significance > SURE) & (size > floor))
 
 
 def _size(moments: Samples) -> float:
