@@ -11,7 +11,7 @@ import pytest
 
 from pbrl_mismatch import EFFECTS, DiagnoseOptions
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.weigh import CLEAR, weigh
+from pbrl_mismatch.search.weigh import CLEAR, DISCREPANCY, OF_EXACT, weigh
 
 OPTIONS = DiagnoseOptions()
 
@@ -62,18 +62,30 @@ TETHER, SLOPE, DRAG = "tether/0", "floor_slope/0", "viscous_drag/0"
 
 
 @pytest.mark.parametrize("unexplained", [0.0, 70.0])
-def test_one_effect_more_takes_more_than_a_wrong_law_leaves(unexplained: float) -> None:
+@pytest.mark.parametrize(("first", "second", "share"), [(TETHER, SLOPE, DISCREPANCY), (SLOPE, TETHER, OF_EXACT)])
+def test_one_effect_more_takes_more_than_a_wrong_law_leaves(
+    unexplained: float, first: str, second: str, share: float
+) -> None:
     def gained(more: float) -> float:
         found = weights(
-            fitted(f"free + {TETHER}", 900.0, 2.0 * unexplained),
-            fitted(f"free + {SLOPE}", -50.0, 1000.0),
-            fitted(f"free + {TETHER} + {SLOPE}", 900.0 + more, unexplained),
+            fitted(f"free + {first}", 900.0, 2.0 * unexplained),
+            fitted(f"free + {second}", -100.0, 1000.0),
+            fitted(f"free + {first} + {second}", 900.0 + more, unexplained),
         )
-        return found["floor_slope", "tether"] - found["tether",]
+        return found["floor_slope", "tether"] - found[(first.split("/")[0],)]
 
-    # Of two that were tried, one; a twenty-fifth of what the first explains; what both leave; and clearly.
-    assert gained(200.0) == pytest.approx(200.0 - math.log(2.0) - 0.04 * 1000.0 - unexplained - CLEAR)
+    # Of two that were tried, one; a share of what the first explains, of an exact law a small one; what both leave;
+    # and clearly.
+    assert gained(200.0) == pytest.approx(200.0 - math.log(2.0) - share * 1000.0 - unexplained - CLEAR)
     assert gained(300.0) - gained(200.0) == pytest.approx(100.0)
+
+
+def test_what_an_exact_law_explains_leaves_less_than_what_a_wrong_one_explains_beside_it() -> None:
+    # The slope explains most, the cord half as much and is a little wrong: what that leaves is more.
+    single, beside = fitted(f"free + {SLOPE}", 900.0), fitted(f"free + {TETHER}", 400.0)
+    found = weights(single, beside, fitted(f"free + {SLOPE} + {TETHER}", 1000.0))
+    gained = found["floor_slope", "tether"] - found["floor_slope",]
+    assert gained == pytest.approx(100.0 - math.log(2.0) - DISCREPANCY * 500.0 - CLEAR)
 
 
 def test_what_the_likeliest_set_leaves_counts_against_all_alike() -> None:

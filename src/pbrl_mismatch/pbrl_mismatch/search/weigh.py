@@ -18,6 +18,8 @@ VETO, VETO_SHARE = 8.0, 0.05
 evidence gained, is not named."""
 DISCREPANCY = 0.04
 """Share of what a law explains that its being wrong may leave for others to explain."""
+OF_EXACT = 0.01
+"""The same of laws that are exact, for what the smoothed path and the sensor's own error leave."""
 CLEAR = 5.0
 """One effect more has to be likelier by more [nat], very strong evidence (Kass and Raftery 1995): some twenty are
 tried, on laws that are all a little wrong."""
@@ -76,8 +78,7 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
         weight = prior + _averaged(members, np.array([_evidence(member) for member in members]))
         if len(key) > 1:
             parts = [best[other] for other in groups if other and set(other) < set(key)]
-            known = max((_of_motion(part) for part in parts), default=-math.inf)
-            wrong = DISCREPANCY * max(known - _of_motion(best[()]), 0.0)
+            wrong = max((_left_by(part, _of_motion(best[()])) for part in parts), default=0.0)
             weight -= wrong + left[len(key)] + CLEAR * (len(key) - 1)
         limits = [_evidence(best[other]) for other in _limits(key) if other in groups]
         weight -= REFINED * max(max(limits, default=none) - none, 0.0)
@@ -93,6 +94,12 @@ def _evidence(fitted: Fitted) -> float:
 def _of_motion(fitted: Fitted) -> float:
     """Return its part that is not beside the motion, minus infinity where it has none [nat]."""
     return fitted.of_motion if math.isfinite(fitted.of_motion) else -math.inf
+
+
+def _left_by(part: Fitted, none: float) -> float:
+    """Return what a part leaves for others, as its laws are a little wrong, where nothing explains `none` [nat]."""
+    exact = all(EFFECTS[name].exact for name in part.hypothesis.effects)
+    return (OF_EXACT if exact else DISCREPANCY) * max(_of_motion(part) - none, 0.0)
 
 
 def _unexplained(sets: Iterable[Fitted]) -> float:
@@ -129,7 +136,7 @@ def worth_of_another(weighed: Sequence[Weighed]) -> float:
     """Return how much likelier one effect more must make the likeliest hypothesis to be likelier than it [nat]."""
     singles = max(sum(len(each.effects) == 1 for each in weighed), 1)
     none = max(each.fitted.of_motion for each in weighed if not each.effects)
-    return math.log(singles) + DISCREPANCY * max(weighed[0].fitted.of_motion - none, 0.0) + CLEAR
+    return math.log(singles) + _left_by(weighed[0].fitted, none) + CLEAR
 
 
 def veto(weighed: Sequence[Weighed], baseline: Fitted, judge: Callable[[Fitted], Fitted]) -> tuple[Weighed, ...]:
