@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ def pulled(concealed_recording: Callable[..., Recording]) -> Any:
 
 def test_points_that_are_drawn_lie_on_the_line_of_action(pulled: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pulls, "SPREAD", 0.0)
+    monkeypatch.setattr(pulls, "TWICE", 0.0)
     track, residual = pulled
     draws = np.full((COUNT, 5), -9.0)
     placed = with_pulls(np.random.default_rng(0), draws, (0, 1), (2, 3), None, track, residual)
@@ -51,6 +53,29 @@ def test_points_that_are_drawn_lie_on_the_line_of_action(pulled: Any, monkeypatc
     assert np.ptp(off[free], axis=0).max() > 0.3
     np.testing.assert_array_equal(placed[moved:], draws[moved:])
     np.testing.assert_array_equal(placed[:, 4], draws[:, 4])
+
+
+def test_a_catch_s_point_is_the_one_that_a_body_turned_about(pulled: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pulls, "TWICE", 1.0)
+    track, residual = pulled
+    state, anchor = residual.state.copy(), np.array([1.0, -2.0])
+    state[:, 2] = np.linspace(0.0, 3.0, len(state))
+    state[:, :2] = anchor - rotated(state[:, 2], np.broadcast_to(POINT - track.body[1:3], state[:, :2].shape))
+    draws = np.full((COUNT, 4), -9.0)
+    turned = replace(residual, state=state)
+    placed = with_pulls(np.random.default_rng(0), draws, (0, 1), (2, 3), None, track, turned)[: int(SHARE * COUNT)]
+    found = np.abs(placed - [*anchor, *POINT]).max(axis=1) < 1e-9
+    assert found.mean() > 0.9, "but for two moments of one heading"
+
+
+def test_the_point_that_is_at_one_place_in_two_states_comes_back() -> None:
+    rng = np.random.default_rng(1)
+    one, other, point = rng.normal(size=(50, 6)), rng.normal(size=(50, 6)), rng.normal(size=(50, 2))
+    other[:, :2] = one[:, :2] + rotated(one[:, 2], point) - rotated(other[:, 2], point)
+    other[:5, 2] = one[:5, 2]
+    found, told = pulls.at_both(one, other)
+    assert told[5:].mean() > 0.9 and not told[:5].any() and np.isfinite(found).all()
+    np.testing.assert_allclose(found[told], point[told], atol=1e-9)
 
 
 def test_a_cord_comes_from_along_its_force_and_is_taut(pulled: Any) -> None:

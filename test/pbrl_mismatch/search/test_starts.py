@@ -18,7 +18,7 @@ from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.search.fitted import cut_stages, fit_from
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.path.ground import ground_of
-from pbrl_mismatch.search.path.starts import ELSEWHERE, each_first, going_on, starts_of
+from pbrl_mismatch.search.path.starts import ELSEWHERE, ELSEWHERE_ON_IT, each_first, going_on, starts_of
 
 OPTIONS = DiagnoseOptions()
 BIAS = np.array([0.4, 3.0, 0.2])
@@ -77,8 +77,22 @@ def test_borders_go_on_from_the_likeliest_and_from_another_place() -> None:
     assert going_on(draws[:20], hypothesis, effect, 2).tolist() == [0, 1], "there is no other place"
     mixed = draws[rng.permutation(60)]
     *likeliest, elsewhere = mixed[going_on(mixed, hypothesis, effect, 1)][:, [x, y]]
-    assert min(np.hypot(*(each - elsewhere)) for each in likeliest) > ELSEWHERE
+    assert min(np.hypot(*(each - elsewhere)) for each in likeliest) > ELSEWHERE[0]
     bias = EFFECTS["wrench_bias"]
     laid = free.with_effect(bias, SCENE, ONSET)
     same = laid.sample_prior(rng, 4).repeat(2, axis=0)
     assert going_on(same, laid, bias, 3).tolist() == [0, 2, 4], "what has no borders is told by all its columns"
+
+
+def test_a_catch_goes_on_from_other_points_of_the_body_where_those_are_sought() -> None:
+    free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.02), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    detent, rng = EFFECTS["detent"], np.random.default_rng(6)
+    somewhere, anywhere = (free.with_effect(detent, SCENE, variant) for variant in (0, 1))
+    apart, most = ELSEWHERE_ON_IT
+    draws = anywhere.sample_prior(rng, 400)
+    chosen = going_on(draws, anywhere, detent, 2)
+    assert chosen[:2].tolist() == [0, 1] and len(chosen) == 2 + most
+    at = draws[:, [anywhere.columns.index(column) for column in ("detent_at_x", "detent_at_y")]][chosen]
+    away = np.linalg.norm(at[:, None] - at, axis=2)
+    assert all(away[k, :k].min() > apart for k in range(2, len(chosen)))
+    assert going_on(somewhere.sample_prior(rng, 400), somewhere, detent, 2).tolist() == [0, 1]

@@ -1,7 +1,9 @@
 """Where something may pull at a body: points on the residual wrench's line of action, and the place they are drawn to.
 
 A force f with moment tau about the centre of mass acts along the line of points p with p x f = tau. A catch holds a
-point of that line near where it is now; a cord holds it from a place further along the force.
+point of that line near where it is now; a cord holds it from a place further along the force. One way through a catch
+leaves open which point of the line it holds. The one that is at one place at two moments, with two headings, is told:
+pairs of moments are drawn too, as a minimal sample of what the motion says (Fischler and Bolles 1981).
 """
 
 from __future__ import annotations
@@ -20,6 +22,10 @@ BESIDE = 0.4
 """A catch is passed within about so long of where it pulls [s]."""
 TAUT = 0.15
 """About how much a cord is stretched [m]."""
+TWICE = 0.8
+"""Of the draws of a catch that are placed so many lie where one point was at two moments."""
+TURNED = 0.05
+"""Two moments tell a point where the body has turned in between by more [rad]."""
 SPREAD = 0.15
 """Scatter of the line of action, of half the footprint's extent."""
 
@@ -65,6 +71,11 @@ def with_pulls(
     body = np.clip(body, middle - half, middle + half) if point is not None else np.zeros_like(body)
     if cord is None:
         beside = np.clip(rows + np.round(BESIDE / track.dt * rng.standard_normal(count)), 0, len(track.clock) - 1)
+        if point is not None:
+            other = rng.choice(len(strength), size=count, p=strength / strength.sum())
+            twice, told = at_both(residual.state[rows], residual.state[other])
+            told &= (np.abs(twice + com - middle) <= half).all(axis=1) & (rng.random(count) < TWICE)
+            body[told], beside[told] = twice[told] + com, rows[told]
         there = _place(residual.state[beside.astype(np.int64)], body - com)
     else:
         length = np.exp(draws[:count, cord])
@@ -74,6 +85,18 @@ def with_pulls(
     if point is not None:
         out[:count, point] = body
     return out
+
+
+def at_both(one: Array, other: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the points (n, 2) of the body from its centre of mass that are at one place in two states (n, 6).
+
+    Where the body has not turned in between there is none, which is told beside (n,).
+    """
+    rotations = np.exp(1j * one[:, 2]) - np.exp(1j * other[:, 2])
+    told = np.abs(rotations) > TURNED
+    way = (other[:, :2] - one[:, :2]) @ np.array([1.0, 1j])
+    found = np.where(told, way / np.where(told, rotations, 1.0), 0.0)
+    return np.column_stack([found.real, found.imag]), told
 
 
 def _place(state: Array, arm: Array) -> Array:

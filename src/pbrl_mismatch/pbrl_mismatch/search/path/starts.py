@@ -32,11 +32,13 @@ FOUND = frozenset({"wheel_x", "wheel_y", "wheel_theta", "hinge_x", "hinge_y", "h
 PARENTS, NEARBY = 3, (0.15, 0.04)
 """Of the draws of each half so many are drawn about again; how far, in standard deviations of the prior: a second time
 what is met, or missed by a centimetre."""
+OF_A_CATCH = 4
+"""So many times as many draws has one whose point is sought on the body too: both are met within two centimetres."""
 BEGUN, CLIMBED = 3, 8
 """Steps along the path of all starts of a hypothesis, and of the best of them."""
-ELSEWHERE = 0.4
-"""What has borders goes on from the best so far from the likeliest as well [m]: of a misfit how far a draw is from its
-top says more than its place."""
+ELSEWHERE, ELSEWHERE_ON_IT = (0.4, 1), (0.08, 6)
+"""What has borders goes on from the best so far from the likeliest as well [m], from so many of them, and so does a
+catch, of its point on the body: of a misfit how far a draw is from its top says more than its place."""
 
 
 def starts_of(
@@ -58,7 +60,8 @@ def starts_of(
     ranked, misfit = screen(ground, hypothesis, effect, draws)
     searched = _searched(effect, variant)
     # Edges in time and borders are met by few draws and felt from nearby only: the best ones are drawn about again.
-    for nearby in (NEARBY if effect.touches is not None else NEARBY[:1]) if searched else ():
+    narrow = effect.touches is not None or _is_catch(effect)
+    for nearby in (NEARBY if narrow else NEARBY[:1]) if searched else ():
         orders = [_in_order(misfit, half) for half in (~afresh, afresh)]
         likely = np.concatenate([order[_parents(ranked[order], hypothesis, effect)] for order in orders])
         parents = np.resize(likely, len(draws))
@@ -74,6 +77,16 @@ def starts_of(
     best = begun.coordinates[each_first(begun.evidence, [len(each) for each in starts])]
     kept = best[going_on(best, hypothesis, effect, options.keep[0])]
     return climb_along(ground.climbed, hypothesis, kept, CLIMBED)
+
+
+def _is_catch(effect: Effect) -> bool:
+    """Tell whether a point of the body is drawn to a place that it passes."""
+    return bool(effect.pulls) and effect.cord is None
+
+
+def _seeks_a_point(effect: Effect, columns: tuple[str, ...]) -> bool:
+    """Tell whether a catch's point on the body is free too."""
+    return _is_catch(effect) and set(effect.pulls) <= set(columns)
 
 
 def _searched(effect: Effect, variant: int) -> list[str]:
@@ -93,6 +106,8 @@ def drawn(
     """Return draws (n, K), and which of them have the ground's own columns as they were believed to be (n,)."""
     track, columns, kept = ground.cuts.track, hypothesis.columns, _kept()
     count = max(options.draws * len(_searched(effect, variant)) // 3, 2)
+    if _seeks_a_point(effect, columns):
+        count *= OF_A_CATCH
     if effect.remembers and effect.touches is None:
         count = max(count // 4, 8)  # each costs twice as much, and its place is not to be found
     draws = hypothesis.sample_prior(rng, count)
@@ -154,18 +169,26 @@ def _placed(
 
 
 def going_on(draws: Array, hypothesis: Hypothesis, effect: Effect, count: int) -> NDArray[np.int64]:
-    """Return which draws (n, K), likeliest first, to go on from: so many apart, of borders one elsewhere too."""
+    """Return which draws (n, K), likeliest first, to go on from: so many apart, of some others elsewhere too."""
     kept = apart_rows(draws, hypothesis.spread, count)
-    if effect.region is None:
-        return kept
-    x, y = draws[:, [hypothesis.columns.index(column) for column in effect.region[:2]]].T
-    away = np.min(np.hypot(x[:, None] - x[kept], y[:, None] - y[kept]), axis=1)
-    return np.concatenate([kept, np.flatnonzero(away > ELSEWHERE)[:1]])
+    place, apart, most = _sought(effect, hypothesis.columns)
+    at = draws[:, [hypothesis.columns.index(column) for column in place]]
+    for _ in range(most):
+        away = np.min(np.linalg.norm(at[:, None] - at[kept], axis=2), axis=1)
+        kept = np.concatenate([kept, np.flatnonzero(away > apart)[:1]])
+    return kept
+
+
+def _sought(effect: Effect, columns: tuple[str, ...]) -> tuple[Sequence[str], float, int]:
+    """Return the columns of a place that others are gone on with, how far apart [m], and how many; none mostly."""
+    if effect.region is not None:
+        return effect.region[:2], *ELSEWHERE
+    return (effect.pulls[2:], *ELSEWHERE_ON_IT) if _seeks_a_point(effect, columns) else ((), 0.0, 0)
 
 
 def _parents(draws: Array, hypothesis: Hypothesis, effect: Effect) -> NDArray[np.int64]:
     """Return which draws (n, K), likeliest first, are drawn about again."""
-    if effect.region is not None:
+    if effect.region is not None or _is_catch(effect):
         return going_on(draws, hypothesis, effect, PARENTS)
     return np.arange(min(PARENTS, len(draws)))
 
