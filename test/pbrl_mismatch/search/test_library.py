@@ -18,7 +18,7 @@ from pbrl_mismatch.search.grip import GripEvidence, GripLaw, beside_motion
 from pbrl_mismatch.search.grown import AS_GOOD, survivors
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.library import of_every_shape, search_library
-from pbrl_mismatch.search.weigh import CLEAR, DISCREPANCY, weigh, worth_of_another
+from pbrl_mismatch.search.weigh import CLEAR, OF_EXACT, weigh, worth_of_another
 
 FEW = ("viscous_drag", "floor_slope", "wrench_bias")
 OPTIONS = DiagnoseOptions(
@@ -52,7 +52,8 @@ def test_nothing_is_simulated_where_the_path_has_no_use_for_it(
         assert not again, "what explains all leaves nothing that is worth another"
         asks = worth_of_another(weigh([base], found, OPTIONS))
         singles = len({each.hypothesis.effects for each in found})
-        assert asks == pytest.approx(np.log(singles) + DISCREPANCY * (best.evidence - base.evidence) + CLEAR)
+        assert EFFECTS["viscous_drag"].exact
+        assert asks == pytest.approx(np.log(singles) + OF_EXACT * (best.evidence - base.evidence) + CLEAR)
 
 
 def test_what_only_the_grippers_poses_show_is_worth_simulating(
