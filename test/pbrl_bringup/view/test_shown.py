@@ -98,6 +98,22 @@ def test_a_diagnosis_is_drawn_where_it_belongs() -> None:
 
 
 @pytest.mark.parametrize(
+    "found",
+    [
+        {"effects": [{"effect": "external_force", "probability": 0.9, "when": [[103.0, 105.0]]}]},
+        {"unknown": True, "unknown_description": {"when": [[103.0, 105.0]], "sentences": ["a push"]}},
+        {"effects": [{"effect": "pose_bias", "probability": 0.9, "when": None}], "unknown_description": None},
+    ],
+)
+def test_what_has_no_place_or_no_name_is_shaded_when_it_acts(found: dict[str, object]) -> None:
+    named = {"table": Found.model_validate({"mismatch": True, **found})}
+    diagnosed = Diagnosed(named, {"table": Lacking.model_validate(lacking())})
+    data = decorated(shown_of(recorded(), "bag"), Extras(), {}, diagnosed).data()
+    acts = [] if "pose_bias" in str(found) else [[3.0, 5.0]]
+    assert not data["regions"] and data["residuals"] == [{"object": 2, "largest": 5.0, "when": acts}]
+
+
+@pytest.mark.parametrize(
     ("text", "said"),
     [
         ("", "expected JSON"),

@@ -34,21 +34,22 @@ def decorated(
     lacking = {name: each for name, each in (diagnosed.residuals if diagnosed else {}).items() if name in names}
     strangers = sorted((set(known) | set(found)) - set(names))
     notes = [f"{name!r} is in a model or report, and not in this recording" for name in strangers]
-    regions = regions_of(found, names, shown.origin)
     still = {
         **shown.still,
         "notes": [*shown.still["notes"], *extras.notes, *notes],
         "objects": [{**each, "model": known.get(each["name"])} for each in shown.still["objects"]],
         "plans": extras.plans_since(shown.origin),
-        "regions": regions,
-        "residuals": [_residual(names.index(name), each, regions) for name, each in lacking.items()],
+        "regions": regions_of(found, names, shown.origin),
+        "residuals": [
+            _residual(names.index(name), each, found.get(name), shown.origin) for name, each in lacking.items()
+        ],
         "told": sentences(found),
     }
     tracks = [BandTrack(np.array(each.time) - shown.origin, np.array(each.wrench)) for each in lacking.values()]
     return replace(shown, still=still, residuals=tracks)
 
 
-def _residual(number: int, lacking: Lacking, regions: list[dict[str, Any]]) -> dict[str, Any]:
+def _residual(number: int, lacking: Lacking, found: Found | None, origin: float) -> dict[str, Any]:
     force = np.hypot(*np.array(lacking.wrench).reshape(-1, 3)[:, :2].T)
-    when = [moment for region in regions if region["of"] == number for moment in region["when"]]
+    when = [[start - origin, end - origin] for start, end in (found.acting if found else ())]
     return {"object": number, "largest": float(force.max(initial=0.0)), "when": when}

@@ -18,6 +18,7 @@ from pbrl_bringup.errors import BringupError
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
+Interval = tuple[Finite, Finite]
 
 WORLD = ("world", "floor")
 """Frames of places that stay where they are."""
@@ -45,7 +46,13 @@ class Named(_Part):
     effect: str
     probability: Finite
     where: Place | None = None
-    when: tuple[tuple[Finite, Finite], ...] | None = None
+    when: tuple[Interval, ...] | None = None
+
+
+class Unnamed(_Part):
+    """What is left out and has no name: when it is surely there [s]."""
+
+    when: tuple[Interval, ...] = ()
 
 
 class Found(_Part):
@@ -54,6 +61,13 @@ class Found(_Part):
     mismatch: bool
     unknown: bool = False
     effects: tuple[Named, ...] = ()
+    unknown_description: Unnamed | None = None
+
+    @property
+    def acting(self) -> tuple[Interval, ...]:
+        """Return when what is named acts, or what has no name is surely there [s]."""
+        named = tuple(moment for effect in self.effects for moment in effect.when or ())
+        return named + (self.unknown_description.when if self.unknown_description else ())
 
 
 class Report(_Part):
