@@ -22,7 +22,7 @@ from pbrl_model.sensing.windows import LEAST_NOISE, WIDENING
 Array = NDArray[np.float64]
 
 MEMORY = 0.4
-"""Time in which a left-out wrench forgets itself [s]: a contact's, a border's; steady ones are no worse for it."""
+"""Time in which a left-out wrench forgets itself [s]: a contact's, a border's."""
 MEMORIES = (MEMORY, 1.5, 5.0)
 """Those that are tried where none is told: what lasts for a push, or is steady, is lost in the noise of a short one."""
 SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
