@@ -17,7 +17,8 @@ from shapely import contains_xy
 from shapely.geometry import Polygon
 
 from pbrl_bringup.concealed.truth import Truth
-from pbrl_bringup.rivals.samples import CELL, Interval, Regimes, Samples
+from pbrl_bringup.diagnosis.told import acting_times
+from pbrl_bringup.rivals.samples import CELL, Regimes, Samples
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -125,11 +126,9 @@ def claimed_by_report(found: Mapping[str, Any], samples: Samples) -> tuple[Mask,
     An effect without times acts always; one that is a region of the floor claims its outline. Of what has no name those
     times are claimed at which it is surely there.
     """
-    described = found.get("unknown_description") or {}
-    claimed, outlines = samples.inside([(a, b) for a, b in described.get("when", [])]), []
+    claimed, outlines = samples.inside(acting_times(found)), []
     for each in found["effects"]:
-        intervals: list[Interval] | None = each.get("when")
-        claimed |= np.ones_like(claimed) if intervals is None else samples.inside([(a, b) for a, b in intervals])
+        claimed |= each.get("when") is None
         where = each.get("where")
         if each["effect"] in REGIONS and where is not None:
             outlines.append(np.array(where["shape"], dtype=float))

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pbrl_bag.types import BodyGeometry
-from pbrl_bringup.diagnosis.told import acting_times
+from pbrl_bringup.diagnosis.told import acting_legend, acting_times
 from pbrl_control.planar import placed
 from pbrl_mismatch.data.residual import ResidualWrench
 from pbrl_mismatch.diagnose import ObjectDiagnosis
@@ -103,7 +103,6 @@ def over_time(found: ObjectDiagnosis) -> str:
     rows = figure.subplots(3, 1, sharex=True)
     time = residual.time - residual.time[0]
     spread = 2.0 * np.sqrt(np.einsum("tii->ti", residual.covariance))
-    when = acting_times(found.report)
     names = ("force to the right [N]", "force away [N]", "turning moment [N m]")
     for k, (axes, name) in enumerate(zip(rows, names, strict=True)):
         axes.spines[["top", "right"]].set_visible(False)
@@ -113,10 +112,10 @@ def over_time(found: ObjectDiagnosis) -> str:
             axes.plot(time[part], residual.world[part, k], color=ORANGE, lw=1.2)
         axes.axhline(0.0, color="black", lw=0.6)
         axes.set_ylabel(name, fontsize=8)
-        for start, end in when:
+        for start, end in acting_times(found.report):
             axes.axvspan(start - residual.time[0], end - residual.time[0], color=PURPLE, alpha=0.12, lw=0)
-    what = "something is surely left out" if found.unknown else "what is named acts"
-    shaded = f"; shaded: when {what}" if when else ""
+    legend = acting_legend(found.report)
+    shaded = f"; shaded: when {legend}" if legend else ""
     rows[-1].set_xlabel(f"seconds since the first grasp{shaded}")
     return _svg(figure)
 

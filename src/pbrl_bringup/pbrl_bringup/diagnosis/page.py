@@ -14,7 +14,7 @@ from markupsafe import Markup
 from pbrl_bag.types import Recording
 from pbrl_bringup.diagnosis.figures import floor, held_out, odds, over_time
 from pbrl_bringup.diagnosis.replay import Replay, replay_of
-from pbrl_bringup.diagnosis.told import Told, told_of_all, told_of_object
+from pbrl_bringup.diagnosis.told import Told, acting_legend, told_of_all, told_of_object
 from pbrl_bringup.files import write_text
 from pbrl_bringup.report_page import TEMPLATES, number, rounded
 from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis
@@ -31,7 +31,7 @@ class Part:
         replay: data of the replay as JSON.
         repaired: whether there is a repaired model beside the baseline.
         places: whether what is named has a place.
-        moments: whether it acts for a part of the time, or is surely there without a name.
+        moments: what the moments are that are shaded, or nothing.
         stretch: length of what is simulated at a time [s].
         floor: figure, an SVG element, and so are the next three.
         over_time: see `figures`.
@@ -46,7 +46,7 @@ class Part:
     replay: Markup
     repaired: bool
     places: bool
-    moments: bool
+    moments: str
     stretch: float
     floor: Markup
     over_time: Markup
@@ -102,7 +102,7 @@ def _part(recording: Recording, name: str, found: ObjectDiagnosis, replay: Repla
         Markup(json.dumps(replay.to_json(), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")),
         replay.after is not None,
         bool(replay.places),
-        bool(replay.moments),
+        acting_legend(found.report),
         float(np.median(replay.time[ends] - replay.time[starts])),
         Markup(floor(recording.bodies[name], found)),
         Markup(over_time(found)),

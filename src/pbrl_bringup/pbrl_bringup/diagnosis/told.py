@@ -52,6 +52,17 @@ def acting_times(report: Mapping[str, Any]) -> list[tuple[float, float]]:
     return [(start, end) for entry in entries for start, end in entry.get("when") or []]
 
 
+def acting_legend(report: Mapping[str, Any]) -> str:
+    """Say what those times are; nothing where there are none.
+
+    Args:
+        report: as of `told_of_object`.
+    """
+    if not acting_times(report):
+        return ""
+    return "something is surely left out" if report.get("unknown") else "what is named acts"
+
+
 def experiment(entry: Mapping[str, Any]) -> str:
     """Say a proposed push in a sentence."""
     x, y = entry["contact_point"]

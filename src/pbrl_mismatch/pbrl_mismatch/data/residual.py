@@ -99,11 +99,11 @@ def residual_wrench(
     for what, value in (("size", 1.0 if size is None else size), ("memory", 1.0 if memory is None else memory)):
         if not (math.isfinite(value) and value > 0.0):
             raise MismatchError(f"residual: expected a {what} above zero, got {value}")
-    if memory is None:
-        each = (residual_wrench(track, row, size=size, memory=memory, stride=stride) for memory in MEMORIES)
-        return max(each, key=lambda found: found.log_likelihood)
+    tried = MEMORIES if memory is None else (memory,)
     if size is None:
-        size = _likeliest_size(track, row, memory, stride)
+        _, size, memory = max((_likeliest_size(track, row, each, stride) for each in tried), key=lambda found: found[0])
+    elif memory is None:
+        memory = max(tried, key=lambda each: _smooth(track, row, size, each, stride, back=False)[2])
     mean, spread, value = _smooth(track, row, size, memory, stride, back=True)
     unknown = in_missing(track.clock, track.missing, memory)
     mean[unknown, 6:] = 0.0
@@ -113,8 +113,11 @@ def residual_wrench(
     )
 
 
-def _likeliest_size(track: Track, row: Array, memory: float, stride: int) -> float:
-    """Return the likeliest of `SIZES`, climbing from a small one: the likelihood has one top."""
+def _likeliest_size(track: Track, row: Array, memory: float, stride: int) -> tuple[float, float, float]:
+    """Return the likelihood [nat] of the likeliest of `SIZES`, the size and the memory.
+
+    It is climbed to from a small one: the likelihood has one top.
+    """
     found: dict[int, float] = {}
 
     def likelihood(k: int) -> float:
@@ -126,7 +129,7 @@ def _likeliest_size(track: Track, row: Array, memory: float, stride: int) -> flo
     for way in (-1, 1):
         while 0 <= best + way < len(SIZES) and likelihood(best + way) > likelihood(best):
             best += way
-    return SIZES[best]
+    return likelihood(best), SIZES[best], memory
 
 
 def _smooth(

@@ -77,12 +77,12 @@ def describe_unknown(
         MismatchError: the recording is too short.
     """
     when = surely_there(track, residual, floor)
-    residual = residual_wrench(track, row)  # a law is told by how it changes: the wrench is followed wherever it goes
+    followed = residual_wrench(track, row)  # a law is told by how it changes: the wrench is followed wherever it goes
     rows = apart(track)
-    every = samples_of(track, residual)
+    every = samples_of(track, followed)
     moments, features = every.take(rows), features_of(every)
     law = sparse_law(rng, moments, [feature.take(rows) for feature in features], floor)
-    law = refined(track, row, residual, law, features, rows, floor)
+    law = refined(track, row, followed, law, features, rows, floor)
     process = wrench_process(moments)
     sentences = [*(_term_sentence(term) for term in law.terms), *_placed(process, moments)]
     if not sentences:
