@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -213,7 +214,9 @@ def fit_baselines(
     if "hinge" in options.baseline and hinge is None:
         raise MismatchError(f"{track.object}: expected a motion that is not along a line for a hinge, got one that is")
     kinds = baselines(believed, options.baseline, 0.5 * (lower + upper), 0.5 * (upper - lower), hinge)
-    return likeliest_first(fit_baseline(rng, track, kind, stages, options) for kind in kinds)
+    with ThreadPoolExecutor(options.workers) as pool:
+        own = zip(rng.spawn(len(kinds)), kinds, strict=True)
+        return likeliest_first(pool.map(lambda each: fit_baseline(each[0], track, each[1], stages, options), own))
 
 
 def least_of_two(one: float, other: float) -> float:
@@ -274,7 +277,7 @@ def _diagnose_object(
         "unexplained_fraction": left,
         "unknown": mismatch and not found.effects,
         "heldout": held_out_report(baseline, named, floor),
-        "not_shown": [each.to_report() for each in could_not_show(rng, named, absent, grip)],
+        "not_shown": [each.to_report() for each in could_not_show(rng, named, absent, grip, options.workers)],
         "unknown_description": None,
     }
     notes = [sentence(track.object, mismatch, verdict, found), *found.notes, *missing_notes(track)]

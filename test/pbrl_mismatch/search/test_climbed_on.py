@@ -14,7 +14,7 @@ from pbrl_mismatch import EFFECTS, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.climbed_on import over_longest, parts_led, polished, starts_from
+from pbrl_mismatch.search.climbed_on import BEHIND, over_longest, parts_led, polished, starts_from
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
@@ -81,6 +81,15 @@ def test_every_set_that_explains_more_leads_whatever_the_likeliest_is(fitted: An
     found = with_effects(sloped, "floor_slope", "detent")
     led = parts_led(in_order(short, stuck, found), [short], stages, options)[0]
     assert led.evidence >= sloped.evidence - 1e-6 > short.evidence
+
+
+def test_a_set_that_is_far_less_likely_than_another_hypothesis_leads_nothing(fitted: Any) -> None:
+    sloped = fitted[1]
+    stages, options = Stages((sloped.peak.objective.cuts,), ()), DiagnoseOptions()
+    short = replace(sloped, peak=climb(sloped.peak.objective, sloped.hypothesis.mean[None], iterations=0))
+    ahead = replace(with_effects(sloped, "detent"), beside=2.0 * BEHIND)
+    weighed = in_order(ahead, with_effects(sloped, "floor_slope", "time_offset"))
+    assert parts_led(weighed, [short], stages, options)[0] is short
 
 
 def test_a_hold_that_gives_way_leads_nothing(fitted: Any) -> None:

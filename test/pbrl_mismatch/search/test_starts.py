@@ -52,6 +52,19 @@ def test_the_moment_that_a_sensor_s_offset_comes_is_found(clean: Any, share: flo
     assert found.noise_scale < 1.1
 
 
+@pytest.mark.parametrize(("name", "variant", "beside"), [("detent", 1, 1), ("floor_patch", 0, 1), ("tether", 0, 0)])
+def test_starts_are_the_likeliest_first_and_of_those_sought_elsewhere_one_more(
+    clean: Any, name: str, variant: int, beside: int
+) -> None:
+    options = DiagnoseOptions(draws=40)
+    free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.02), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    base = fit_from(free, cut_stages(clean, options), free.mean[None], options)
+    ground = ground_of(free, base.peak.coordinates[0], cut_windows(clean, 2.0), options.sensor_floor)
+    found = starts_of(np.random.default_rng(2), name, variant, base, ground, options)
+    assert np.all(np.diff(found.evidence) <= 0.0)
+    assert len(found.coordinates) == len(found.misfit) == len(found.matrix) == options.keep[0] + beside
+
+
 def test_each_group_s_likeliest_come_first_and_all_others_after() -> None:
     rng = np.random.default_rng(3)
     for counts in ([3, 4], [5], [2, 1, 6]):

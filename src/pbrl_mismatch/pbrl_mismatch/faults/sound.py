@@ -6,6 +6,7 @@ a note says what was left out.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -19,6 +20,7 @@ from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.faults.carried import check_carried
 from pbrl_mismatch.faults.repeats import stopped_poses, stopped_wrenches
 from pbrl_mismatch.faults.saturation import saturated
+from pbrl_mismatch.faults.tipped import tips
 from pbrl_model.sensing.motion import LONGEST_GAP, REFERENCE_SPAN
 
 Array = NDArray[np.float64]
@@ -71,6 +73,7 @@ def without_faults(recording: Recording, name: str) -> Sound:
     poses, grippers = dict(recording.object_poses), dict(recording.gripper_poses)
     wrenches = dict(recording.wrenches)
     poses[name] = _moving(poses[name], grasps, f"pose of {name}", missing)
+    _on_its_feet(poses[name], grasps, name, missing)
     for gripper in sorted({grasp.gripper for grasp in grasps}):
         held = [grasp for grasp in grasps if grasp.gripper == gripper]
         if gripper in grippers:
@@ -157,6 +160,16 @@ def _moving(stream: PoseStream, grasps: list[Grasp], what: str, missing: list[Mi
     for start, end in _gaps(stream.time, LONGEST_GAP):
         _add(missing, grasps, start, end, f"{what}: none came, or its clock jumped,")
     return stream if keep.all() else PoseStream(stream.time[keep], stream.position[keep], stream.quaternion[keep])
+
+
+def _on_its_feet(stream: PoseStream, grasps: list[Grasp], name: str, missing: list[Missing]) -> None:
+    """Note where a body was off some of its feet."""
+    found = tips(stream, grasps)
+    if found:
+        rise, lean = 100.0 * max(tip.rise for tip in found), math.degrees(max(tip.lean for tip in found))
+        why = f"{name} was off some of its feet: it rose by up to {rise:.1f} cm and leaned by up to {lean:.0f} deg"
+        for tip in found:
+            _add(missing, grasps, tip.start, tip.end, why)
 
 
 def _felt(stream: WrenchStream, grasps: list[Grasp], what: str, missing: list[Missing]) -> WrenchStream:

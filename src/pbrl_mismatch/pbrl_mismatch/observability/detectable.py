@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_mismatch.data.simulation import poses
-from pbrl_mismatch.effects.effect import Scene
+from pbrl_mismatch.effects.effect import Effect, Scene
 from pbrl_mismatch.effects.grasp_compliance import PARAMETERS as HOLD
 from pbrl_mismatch.effects.registry import EFFECTS, effect_named
 from pbrl_mismatch.kernels.columns import COLUMN
@@ -95,6 +96,7 @@ def could_not_show(
     ground: Fitted,
     effects: Sequence[str] | None = None,
     grip: GripEvidence | None = None,
+    workers: int = 1,
     *,
     level: float = 0.05,
 ) -> tuple[Detectable, ...]:
@@ -105,9 +107,10 @@ def could_not_show(
         ground: the model that is believed: the repaired one, or the baseline.
         effects: names; None: all of the library that are not in `ground`.
         grip: what the grippers' poses say; None where that is nothing.
+        workers: threads; the result does not depend on how many.
         level: of false alarms of the test.
     """
-    found = [each for each in detectable(rng, ground, effects, grip, level=level) if not each.shown]
+    found = [each for each in detectable(rng, ground, effects, grip, workers, level=level) if not each.shown]
     return tuple(sorted(found, key=lambda each: (each.chance, each.effect)))
 
 
@@ -116,6 +119,7 @@ def detectable(
     ground: Fitted,
     effects: Sequence[str] | None = None,
     grip: GripEvidence | None = None,
+    workers: int = 1,
     *,
     level: float = 0.05,
     wanted: float = 0.95,
@@ -128,6 +132,7 @@ def detectable(
         ground: the model that is believed.
         effects: names; None: all of the library that are not in `ground`.
         grip: what the grippers' poses say; None where that is nothing.
+        workers: threads; the result does not depend on how many.
         level: of false alarms of the test.
         wanted: power.
         draws: of each variant's prior.
@@ -135,22 +140,21 @@ def detectable(
     Raises:
         MismatchError: an effect is unknown, or level and power do not fit.
     """
-    names = tuple(EFFECTS) if effects is None else tuple(effects)
-    track = ground.peak.objective.cuts.track
-    scene = scene_of(track, ground.row)
+    every = [effect_named(name) for name in (EFFECTS if effects is None else effects)]
+    absent = [effect for effect in every if effect.name not in ground.hypothesis.effects]
+    scene = scene_of(ground.peak.objective.cuts.track, ground.row)
     motion = Sensitivity(ground)
-    out = []
-    for name in names:
-        effect = effect_named(name)
-        if name in ground.hypothesis.effects:
-            continue
-        shows = motion.noncentrality if grip is None or name != GRASP_COMPLIANCE else partial(_between, grip)
+
+    def most_visible(own: np.random.Generator, effect: Effect) -> Detectable:
+        shows = motion.noncentrality if grip is None or effect.name != GRASP_COMPLIANCE else partial(_between, grip)
         tried = [
-            _variant(rng, ground, shows, scene, name, variant, level, wanted, draws)
+            _variant(own, ground, shows, scene, effect.name, variant, level, wanted, draws)
             for variant in range(len(effect.variants))
         ]
-        out.append(min(tried, key=lambda each: (each.smallest / each.plausible, -each.chance)))
-    return tuple(out)
+        return min(tried, key=lambda each: (each.smallest / each.plausible, -each.chance))
+
+    with ThreadPoolExecutor(workers) as pool:
+        return tuple(pool.map(most_visible, rng.spawn(len(absent)), absent))
 
 
 class Sensitivity:

@@ -47,14 +47,17 @@ def led(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: Diagn
     Where bodies stick there are many tops. An effect that does nothing but lead to a better one explains nothing.
     """
     likely = likeliest_first(each for each in tried if GRASP_COMPLIANCE not in each.hypothesis.effects)[:LEADS]
-    best, climbed = likeliest_first(bases)[0], []
-    for base in bases:
+    best = likeliest_first(bases)[0]
+
+    def climbed(base: Fitted) -> Fitted:
         found = base
         for each in likely if keeps_up(base, best) else []:
             # One that is no likelier for all its freedom has found no better top.
             found = _climbed_on(found, each, stages, options) if each.evidence > found.evidence - FREEDOM else found
-        climbed.append(found)
-    return likeliest_first(climbed)
+        return found
+
+    with ThreadPoolExecutor(options.workers) as pool:
+        return likeliest_first(pool.map(climbed, bases))
 
 
 def keeps_up(base: Fitted, best: Fitted) -> bool:
@@ -231,9 +234,10 @@ def parts_led(
     """Return what was tried, the parts of the sets that explain most climbed on from where those have them.
 
     An effect of which there is nothing may have done no more than lead another to a better top: alone that does as well
-    there.
+    there. Where a set is far less likely than what is likeliest, so are its parts.
     """
-    sets = _sets(weighed)[:LEADS]
+    least = max(each.fitted.evidence for each in weighed) - BEHIND
+    sets = [each for each in _sets(weighed)[:LEADS] if each.evidence > least]
 
     def led_on(part: Fitted) -> Fitted:
         found = part

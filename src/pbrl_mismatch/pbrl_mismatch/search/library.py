@@ -92,7 +92,7 @@ def search_library(
         kept = {
             hypothesis.variant: KEPT
             for k, (hypothesis, starts) in zip(chosen.jobs, running, strict=True)
-            if len(starts) > options.keep[0] and k not in chosen.held
+            if _begins_at_wheel(jobs[k], track) and len(starts) > options.keep[0] and k not in chosen.held
         }
         leading = {begun[k].hypothesis.variant for k in chosen.leading} | set(kept)
         done = grown(pool, running, stages, leading, kept, grip, options)
@@ -205,6 +205,11 @@ def _begun_simulated(
         stopped = held_starts(rng, hypothesis, job.variant, base, job.ground, shortest, options)
         starts = np.concatenate([stopped, starts])
     return hypothesis, starts
+
+
+def _begins_at_wheel(job: _Job, track: Track) -> bool:
+    """Tell whether a job begins where its base's wheel is parted, or where it is off the pin that it stood in for."""
+    return is_another(job.name, job.base) or holds_as_pin(job.name, job.base, track)
 
 
 def trace(longest: Cuts, options: DiagnoseOptions, fitted: Fitted, starts: Array) -> Fitted:

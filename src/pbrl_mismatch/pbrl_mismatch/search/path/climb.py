@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,16 @@ class PathPeak:
         _, log_det = np.linalg.slogdet(self.matrix[row] * np.outer(spread, spread) + np.eye(len(spread)))
         return float(self.evidence[row] + 0.5 * log_det)
 
+    def take(self, rows: NDArray[np.int64]) -> PathPeak:
+        """Return some of the points, in that order."""
+        return replace(
+            self,
+            coordinates=self.coordinates[rows],
+            misfit=self.misfit[rows],
+            evidence=self.evidence[rows],
+            matrix=self.matrix[rows],
+        )
+
     @property
     def noise_scale(self) -> float:
         """Return the least scale of the noise over all windows that a start needs, at least one."""
@@ -80,16 +90,18 @@ def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations:
     steps, spread, mean = step_sizes(hypothesis), hypothesis.spread, hypothesis.mean
     damping, most, holding = np.full(count, FIRST_DAMPING), 3.0 * spread, Holding(count, spread**-2.0)
     every = np.arange(count)
-    moves = np.concatenate([np.zeros((1, free)), np.diag(steps)])
+    moves = np.diag(steps)
 
     def prior(points: Array) -> Array:
         return np.sum(((points - mean) / spread) ** 2, axis=1)
 
-    def linear(points: Array) -> tuple[Array, Array]:
-        rows = hypothesis.rows((points[:, None] + moves).reshape(-1, free))
-        found = along.residual(rows).reshape(len(points), 1 + free, *along.operator.shape[1:2], -1)
-        slope = (found[:, :1] - found[:, 1:]) / steps[None, :, None, None]
-        return found[:, 0], np.clip(np.moveaxis(slope, 1, -1), -1e5, 1e5)
+    def lacking(points: Array) -> Array:
+        return along.residual(hypothesis.rows(points)).reshape(len(points), *along.operator.shape[1:2], -1)
+
+    def slopes(points: Array, residual: Array) -> Array:
+        moved = lacking((points[:, None] + moves).reshape(-1, free)).reshape(len(points), free, *residual.shape[1:])
+        slope = (residual[:, None] - moved) / steps[None, :, None, None]
+        return np.clip(np.moveaxis(slope, 1, -1), -1e5, 1e5)
 
     def normal(residual: Array, slope: Array, weight: Array) -> tuple[Array, Array]:
         scaled = slope * np.sqrt(weight)[:, :, None, None]
@@ -97,8 +109,8 @@ def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations:
         rest = (residual * np.sqrt(weight)[:, :, None]).reshape(len(scaled), -1, 1)
         return np.swapaxes(flat, 1, 2) @ flat, (np.swapaxes(flat, 1, 2) @ rest)[..., 0]
 
-    residual, slope = linear(u)
-    misfit = np.sum(residual**2, axis=2)
+    residual = lacking(u)
+    slope, misfit = slopes(u, residual), np.sum(residual**2, axis=2)
     idle, on = np.zeros(count, dtype=np.int64), every
     for _ in range(iterations):
         matrix, vector = normal(residual[on], slope[on], weights(along, misfit[on]))
@@ -111,13 +123,14 @@ def climb_along(along: Along, hypothesis: Hypothesis, starts: Array, iterations:
         step = np.linalg.solve(damped, pull[..., None])[..., 0]
         step *= np.minimum(1.0, 1.0 / np.max(np.abs(step) / most + 1e-12, axis=1))[:, None]
         trial = hypothesis.believable(u[on] + step)
-        there_residual, there_slope = linear(trial)
+        there_residual = lacking(trial)
         there = np.sum(there_residual**2, axis=2)
         gained = 0.5 * (cost - (-2.0 * likelihood(along, there) + prior(trial)))
         better = gained > 0.0
         moved, left = on[better], on[~better]
-        u[moved], misfit[moved] = trial[better], there[better]
-        residual[moved], slope[moved] = there_residual[better], there_slope[better]
+        u[moved], misfit[moved], residual[moved] = trial[better], there[better], there_residual[better]
+        if len(moved):
+            slope[moved] = slopes(u[moved], residual[moved])
         # First without what is quiet, and only then a shorter step.
         shorter = holding.failed(left, quiet[~better])
         holding.stepped(moved, gained[better])

@@ -76,7 +76,10 @@ def starts_of(
     begun = climb_along(along, hypothesis, np.concatenate(starts), BEGUN)
     best = begun.coordinates[each_first(begun.evidence, [len(each) for each in starts])]
     kept = best[going_on(best, hypothesis, effect, options.keep[0])]
-    return climb_along(ground.climbed, hypothesis, kept, CLIMBED)
+    found = climb_along(ground.climbed, hypothesis, kept, CLIMBED)
+    # At the top a misfit says what a place is worth: of those that were gone on with beside the best, one more is left.
+    most = options.keep[0] + int(len(kept) > options.keep[0])
+    return found.take(np.argsort(-found.evidence, kind="stable")[:most])
 
 
 def _is_catch(effect: Effect) -> bool:
