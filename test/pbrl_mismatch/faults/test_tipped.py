@@ -101,6 +101,11 @@ def test_nothing_is_said_of_few_poses_of_none_with_a_heading_or_of_a_broken_cloc
     assert tips(PoseStream(stream.time[:30], stream.position[:30], stream.quaternion[:30]), HELD) == []
     assert tips(PoseStream(stream.time, stream.position, np.full_like(stream.quaternion, np.nan)), HELD) == []
     assert tips(PoseStream(stream.time[::-1].copy(), stream.position, stream.quaternion), HELD) == []
+    brief = [Grasp("left", "table", float(start), start + 0.4, np.zeros(3)) for start in range(1, 40)]
+    assert tips(stream, brief) == [], "no average is of one grasp"
+    stamps = stream.time.copy()
+    stamps[1::5] = stamps[::5]
+    assert len(tips(PoseStream(stamps, stream.position, stream.quaternion), HELD)) == 1
     holes = np.random.default_rng(1).random(len(stream.time)) < 0.2
     position = stream.position.copy()
     position[holes] = np.nan

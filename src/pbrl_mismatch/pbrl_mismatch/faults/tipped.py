@@ -54,16 +54,18 @@ def tips(stream: PoseStream, grasps: Sequence[Grasp]) -> list[Tip]:
     """
     time, spaces = stream.time, np.diff(stream.time)
     yaw = planar_yaw(stream.quaternion)
-    ordered = bool(np.isfinite(time).all() and np.all(spaces > 0.0))
     known = np.isfinite(yaw) & np.isfinite(stream.position).all(axis=1)
     held = [np.flatnonzero(known & (time >= grasp.start) & (time <= grasp.end)) for grasp in grasps]
-    if not ordered or sum(map(len, held)) < LEAST:
+    if sum(map(len, held)) < LEAST or not np.all(spaces >= 0.0) or np.median(spaces) == 0.0:
         return []
     count = max(round(SPAN / float(np.median(spaces))), 1)
+    held = [own for own in held if len(own) >= count]
+    if not held:
+        return []
     rows = np.unique(np.concatenate(held))
     off = np.full((len(time), 3), math.nan)
     off[rows] = _off_usual(stream, yaw, rows)
-    runs = [(own, _averaged(off[own], count)) for own in held if len(own) >= count]
+    runs = [(own, _averaged(off[own], count)) for own in held]
     every = np.concatenate([mean for _, mean in runs])
     # Noise may last: of so few averages their own spread says it less well than that of all poses, were it white.
     white = np.median(np.abs(off[rows]), axis=0) / math.sqrt(count)
