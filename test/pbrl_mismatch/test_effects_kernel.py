@@ -226,6 +226,16 @@ def test_hidden_hinge_holds_its_point(bench: Any) -> None:
     assert path[-1, 2] > 0.5
 
 
+def test_hidden_hinge_that_was_not_at_rest_pulls_by_what_it_was_off(bench: Any) -> None:
+    heading, off = 0.7, np.array([0.003, -0.001])
+    start = np.array([0.0, 0.0, heading, 0.0, 0.0, 0.0])
+    path = bench(pushed(0.0, 3), start).run(pivot_stiffness=1000.0, pivot_off_x=off[0], pivot_off_y=off[1])
+    turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])
+    np.testing.assert_allclose(speeds(path)[1, :2] * MASS / DT, -1000.0 * turn @ off, rtol=0.1)
+    at_rest = bench(pushed(0.0, 3), start).run(pivot_stiffness=1000.0)
+    np.testing.assert_allclose(at_rest, np.tile(start[:3], (len(at_rest), 1)), atol=1e-12)
+
+
 @pytest.mark.parametrize("zeta", [0.1, 0.5])
 def test_hidden_hinge_swings_as_its_give_and_damping_say(bench: Any, zeta: float) -> None:
     dt, stiffness = 5e-4, 2000.0

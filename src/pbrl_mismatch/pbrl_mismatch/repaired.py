@@ -19,6 +19,7 @@ from pbrl_mismatch.effects.registry import EFFECTS, effect_named
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.kernels.columns import COLUMN, COLUMNS, UNIT, neutral_row
 from pbrl_mismatch.kernels.motion_kernel import simulate_serial
+from pbrl_mismatch.kernels.places import PIVOT_OFF_X, PIVOT_OFF_Y
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_model.errors import ModelError
 from pbrl_model.model_file import LearnedEffect, LearnedParameter, SavedModel, Shape, learned, load_model
@@ -189,6 +190,7 @@ def predict_repaired(
         _without_sensors(rows)
     elif not body_wrench and any(name in OF_SENSORS for name in model.names):
         raise MismatchError("predict: expected a measured wrench in the body's axes, got world axes; set body_wrench")
+    rows[:, [PIVOT_OFF_X, PIVOT_OFF_Y]] = 0.0  # A pin is at rest where a prediction begins.
     lever = at - np.array(model.shape.com)
     return np.stack([_predicted(row[None], model, start, force, lever, body_wrench, dt, clock) for row in rows])
 

@@ -43,7 +43,7 @@ class Track:
         clock: (T,) [s].
         begin: (E,) first step of each episode.
         last: (E,) last step of each episode.
-        pivot: (E, 3) smoothed pose of the body's frame when each episode began.
+        pivot: (E, 3) smoothed pose of the body's frame when the first episode began, for a pin holds one place in all.
         body: (4,) nominal inertia over mass [m^2], centre of mass (x, y) [m], dt [s].
         outline: (k, 2) footprint.
         feet: (F, 2) points that carry the load.
@@ -139,7 +139,7 @@ def lay_track(
         clock=np.concatenate([motion.time[:-1] for motion in motions]),
         begin=begin,
         last=begin + lengths - 1,
-        pivot=np.stack([origin_of(seen[b], properties.com) for b in begin]),
+        pivot=np.tile(origin_of(seen[0], properties.com), (len(begin), 1)),
         body=np.array([properties.inertia_per_mass, *properties.com, dt]),
         outline=np.ascontiguousarray(check_polygon(geometry.footprint)),
         feet=_feet(geometry),

@@ -100,6 +100,8 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("pivot_x", "m", 0.0),
     ("pivot_y", "m", 0.0),
     ("pivot_damping", "1", 0.3),
+    ("pivot_off_x", "m", 0.0),
+    ("pivot_off_y", "m", 0.0),
     ("unseen_force", "N", 0.0),
     ("unseen_x", "m", 0.0),
     ("unseen_y", "m", 0.0),

@@ -18,7 +18,7 @@ SHARE, SCATTER = 0.7, 0.03
 def fixed_place(track: Track) -> tuple[Array, float]:
     """Return the place (2,) in the world about which the body turned, by least squares, and how far it moved there.
 
-    In each episode the point of the body that was over the place h when it began is at
+    The point of the body that was over the place h when the first episode began is at
 
         p(t) + R(t) R(0)^T (h - p(0)),
 
@@ -30,15 +30,11 @@ def fixed_place(track: Track) -> tuple[Array, float]:
     Returns:
         h [m], and the root mean square of its distance from that point [m].
     """
-    left, right = [], []
-    for begin, last in zip(track.begin, track.last, strict=True):
-        x, y, turn = track.seen[begin : last + 1, :3].T
-        c, s = np.cos(turn - turn[0]), np.sin(turn - turn[0])
-        turned = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], 1)
-        place = np.stack([x, y], -1)
-        left.append(turned - np.eye(2))
-        right.append(turned @ place[0] - place)
-    matrix, target = np.concatenate(left), np.concatenate(right)
+    x, y, turn = track.seen[:, :3].T
+    c, s = np.cos(turn - turn[0]), np.sin(turn - turn[0])
+    turned = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], 1)
+    place = np.stack([x, y], -1)
+    matrix, target = turned - np.eye(2), turned @ place[0] - place
     found, *_ = np.linalg.lstsq(matrix.reshape(-1, 2), target.reshape(-1), rcond=None)
     moved = matrix @ found - target
     return np.asarray(found, dtype=np.float64), float(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
