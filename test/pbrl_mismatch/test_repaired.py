@@ -116,6 +116,16 @@ def test_a_force_at_a_contact_turns_the_body_by_its_lever(saved: SavedModel) -> 
     assert np.allclose(at_contact, predict_repaired(saved, start, moved, body_wrench=True), atol=1e-9)
 
 
+def test_a_pin_is_at_rest_where_a_prediction_begins(track: Any) -> None:
+    made = hypothesis(track, "free", "hidden_hinge")
+    at = made.mean[None].copy()
+    at[0, made.columns.index("pivot_off_x")] = 2.0 * made.spread[made.columns.index("pivot_off_x")]
+    model = saved_model(np.random.default_rng(0), peaked(made, at), track)
+    assert rows_of(model)[0, COLUMN["pivot_off_x"]] == pytest.approx(0.01)
+    path = predict_repaired(model, np.array([0.4, -0.3, 0.9, 0.0, 0.0, 0.0]), np.zeros((100, 3)))[0]
+    np.testing.assert_allclose(path, np.tile(path[0], (101, 1)), atol=1e-9)
+
+
 def test_drag_slows_a_prediction_and_draws_scatter_about_the_best(saved: SavedModel) -> None:
     start, wrench = np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.0]), np.zeros((200, 3))
     best = predict_repaired(saved, start, wrench)
@@ -156,6 +166,19 @@ def test_what_the_baseline_has_is_no_mismatch_and_is_kept(
     assert predictive_test(found.peak, 0).p_value > 1e-3
     drag = COLUMN["drag_linear"]
     assert abs(np.log(found.row[drag] / fitted.row[drag])) < 0.1
+
+
+def test_what_a_pin_was_off_its_rest_says_nothing_of_the_next_recording(track: Any, tmp_path: Path) -> None:
+    made = hypothesis(track, "free", "hidden_hinge")
+    save_model(
+        saved_model(np.random.default_rng(0), peaked(made, made.mean[None] + made.spread), track), tmp_path / "m.json"
+    )
+    told = baseline_from_model(tmp_path / "m.json", **SPREADS).hypothesis
+    believed = {each.column: each for each in told.parameters}
+    own = {each.column: each for each in made.parameters}
+    for column in ("pivot_off_x", "pivot_off_y"):
+        assert (believed[column].mean, believed[column].spread) == (0.0, own[column].spread)
+    assert believed["pivot_x"].spread < 0.1 * own["pivot_x"].spread
 
 
 def test_a_posterior_of_fit_is_a_baseline_too(track: Any, fitted: Fitted, tmp_path: Path) -> None:

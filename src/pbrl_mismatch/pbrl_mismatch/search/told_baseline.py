@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_mismatch.effects.effect import Parameter
+from pbrl_mismatch.effects.hidden_hinge import AT_REST
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 from pbrl_mismatch.repaired import load_repaired, rows_of
@@ -30,8 +31,13 @@ LEAST_SPREAD = 1e-4
 """A posterior is not taken to be narrower: the climb takes steps of a share of it."""
 ANY_TURN = 1.5
 """Spread of an angle that says nothing of the next recording [rad]."""
-OF_THE_MOMENT = {"caster_heading": 0.0, "periodic_phase": 0.0}
-"""Columns that say how things stood when a recording began, not what they are: each anew, about this value."""
+OF_THE_MOMENT = {
+    "caster_heading": ANY_TURN,
+    "periodic_phase": ANY_TURN,
+    "pivot_off_x": AT_REST,
+    "pivot_off_y": AT_REST,
+}
+"""Columns that say how things stood when a recording began, not what they are: each anew, within so much of zero."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +94,7 @@ def _of_model(model: SavedModel) -> tuple[list[Parameter], Array]:
 def _believed(column: str, told: LearnedParameter) -> Parameter:
     """Return a posterior as a prior, Gaussian in the coordinate that it was learned in."""
     if column in OF_THE_MOMENT:
-        return Parameter(column, OF_THE_MOMENT[column], ANY_TURN)
+        return Parameter(column, 0.0, OF_THE_MOMENT[column])
     draws = np.log(told.draws) if told.positive else np.asarray(told.draws)
     spread = max(float(np.std(draws)), LEAST_SPREAD)
     return Parameter(column, told.best, spread, positive=told.positive)
