@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_mismatch.data.missing import runs_of
 from pbrl_mismatch.data.residual import accelerations
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.effects.registry import effect_named
@@ -111,12 +112,9 @@ def intervals(track: Track, acting: NDArray[np.bool_]) -> tuple[Interval, ...]:
         raise MismatchError(f"activity: expected a mask of {len(track.clock)} steps, got shape {acting.shape}")
     found: list[Interval] = []
     for begin, last in zip(track.begin, track.last, strict=True):
-        mask = acting[begin : last + 1].astype(np.int8)
-        edges = np.diff(np.concatenate([[0], mask, [0]]))
-        starts, ends = np.flatnonzero(edges > 0) + begin, np.flatnonzero(edges < 0) + begin
         bouts: list[list[float]] = []
-        for start, end in zip(starts, ends, strict=True):
-            first, until = float(track.clock[start]), float(track.clock[end - 1]) + track.dt
+        for start, end in runs_of(acting[begin : last + 1]):
+            first, until = float(track.clock[begin + start]), float(track.clock[begin + end - 1]) + track.dt
             if bouts and first - bouts[-1][1] < GAP:
                 bouts[-1][1] = until
             else:

@@ -35,6 +35,12 @@ class Missing:
     saturated: bool = False
 
 
+def runs_of(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Yield the rows [first, last) of each run of a mask (n,)."""
+    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    yield from zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True)
+
+
 def in_missing(time: Array, missing: Sequence[Missing], margin: float = 0.0) -> NDArray[np.bool_]:
     """Return which of the times (n,) lie in a missing stretch, or nearer to one than a margin [s]."""
     out = np.zeros(len(time), dtype=bool)
@@ -85,8 +91,7 @@ def _known(motion: Motion, missing: Sequence[Missing]) -> Iterator[tuple[int, in
     """Yield steps (first, last) between missing stretches."""
     middle = 0.5 * (motion.time[1:] + motion.time[:-1])
     known = ~in_missing(middle, missing, 0.5 * motion.dt)
-    edges = np.diff(np.concatenate([[0], known.astype(np.int8), [0]]))
-    for first, last in zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True):
+    for first, last in runs_of(known):
         if (last - first) * motion.dt >= LEAST_PIECE:
             yield first, last
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bag.types import PoseStream, WrenchStream
+from pbrl_mismatch.data.missing import runs_of
 
 Array = NDArray[np.float64]
 Run = tuple[int, int]
@@ -29,7 +30,7 @@ ROUGH = 3e-4
 """A tag's noise: half the readings bend away from a line by more than this [m]."""
 
 
-def runs_of(time: Array, values: Array, count: int, seconds: float) -> list[Run]:
+def equal_runs(time: Array, values: Array, count: int, seconds: float) -> list[Run]:
     """Return the runs of equal rows that are long enough.
 
     Args:
@@ -39,15 +40,13 @@ def runs_of(time: Array, values: Array, count: int, seconds: float) -> list[Run]
         seconds: that it lasts at least.
     """
     same = np.all(np.nan_to_num(values[1:]) == np.nan_to_num(values[:-1]), axis=1)
-    edges = np.diff(np.concatenate([[0], same.astype(np.int8), [0]]))
-    pairs = zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True)
-    return [(a, b) for a, b in pairs if b - a + 1 >= count and time[b] - time[a] >= seconds]
+    return [(a, b) for a, b in runs_of(same) if b - a + 1 >= count and time[b] - time[a] >= seconds]
 
 
 def stopped_poses(stream: PoseStream) -> list[Run]:
     """Return the runs in which a tracker had stopped; what stands still and is seen without noise is none."""
     values = np.concatenate([stream.position, stream.quaternion], axis=1)
-    runs = runs_of(stream.time, values, POSES, POSE_SECONDS)
+    runs = equal_runs(stream.time, values, POSES, POSE_SECONDS)
     if not runs or _repeats(values, runs) > USUAL:
         return []
     noisy = _roughness(stream.position, runs) > ROUGH
@@ -57,7 +56,7 @@ def stopped_poses(stream: PoseStream) -> list[Run]:
 def stopped_wrenches(stream: WrenchStream) -> list[Run]:
     """Return the runs in which a wrist sensor had stopped, or was off."""
     values = np.concatenate([stream.force, stream.torque], axis=1)
-    runs = runs_of(stream.time, values, WRENCHES, WRENCH_SECONDS)
+    runs = equal_runs(stream.time, values, WRENCHES, WRENCH_SECONDS)
     return runs if runs and _repeats(values, runs) <= USUAL else []
 
 

@@ -7,12 +7,11 @@ next to it, and noise spreads it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bag.types import WrenchStream
+from pbrl_mismatch.data.missing import runs_of
 
 Array = NDArray[np.float64]
 
@@ -51,7 +50,7 @@ def saturated(stream: WrenchStream, held: NDArray[np.bool_]) -> dict[str, NDArra
 def _is_end(values: Array, axis: int, end: float, held: NDArray[np.bool_]) -> bool:
     value = values[:, axis]
     at = (value == end) & held
-    runs = [(first, last) for first, last in _runs(at) if last - first >= IN_A_ROW]
+    runs = [(first, last) for first, last in runs_of(at) if last - first >= IN_A_ROW]
     if not runs:
         return False
     steps = np.abs(np.diff(value))[held[1:] & ~at[1:] & ~at[:-1]]
@@ -65,9 +64,3 @@ def _is_end(values: Array, axis: int, end: float, held: NDArray[np.bool_]) -> bo
     others = np.delete(values, axis, axis=1)
     changing = np.mean([np.any(np.diff(others[a:b], axis=0) != 0.0, axis=1).mean() for a, b in runs])
     return piled > PILED * int(near.sum()) and abs(end - rest) > FAR * usual and float(changing) > CHANGING
-
-
-def _runs(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Yield the rows [first, last) of each run of a mask."""
-    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
-    yield from zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True)

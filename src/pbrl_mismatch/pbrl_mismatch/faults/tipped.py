@@ -13,10 +13,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from pbrl_bag.types import Grasp, PoseStream
+from pbrl_mismatch.data.missing import runs_of
 from pbrl_model.sensing.clock import planar_yaw
 
 Array = NDArray[np.float64]
@@ -65,7 +67,7 @@ def tips(stream: PoseStream, grasps: Sequence[Grasp]) -> list[Tip]:
     rows = np.unique(np.concatenate(held))
     off = np.full((len(time), 3), math.nan)
     off[rows] = _off_usual(stream, yaw, rows)
-    runs = [(own, _averaged(off[own], count)) for own in held]
+    runs = [(own, sliding_window_view(off[own], count, axis=0).mean(axis=-1)) for own in held]
     every = np.concatenate([mean for _, mean in runs])
     # Noise may last: of so few averages their own spread says it less well than that of all poses, were it white.
     white = np.median(np.abs(off[rows]), axis=0) / math.sqrt(count)
@@ -94,19 +96,12 @@ def _residual(coefficients: Array, usual: Array, value: Array) -> Array:
     return np.asarray(usual @ coefficients - value, dtype=np.float64)
 
 
-def _averaged(off: Array, count: int) -> Array:
-    """Return (n - count + 1, 3) means of so many neighbours."""
-    total = np.concatenate([np.zeros((1, off.shape[1])), np.cumsum(off, axis=0)])
-    return np.asarray((total[count:] - total[:-count]) / count)
-
-
 def _stretches(time: Array, mean: Array, error: Array, count: int) -> Iterator[Tip]:
     """Yield the stretches in which averages (m, 3) of poses at times (n,) are those of a body off its feet."""
     deviations = mean / error
     unlike, up = np.sum(deviations**2, axis=1), deviations[:, 0]
     tipped = (unlike > UNLIKE) & (up > RISES)
-    edges = np.diff(np.concatenate([[0], ((unlike > BEGINS) & (up > 0.0)).astype(np.int8), [0]]))
-    for first, after in zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True):
+    for first, after in runs_of((unlike > BEGINS) & (up > 0.0)):
         if not tipped[first:after].any():
             continue
         rise, lean = mean[first:after, 0].max(), np.linalg.norm(mean[first:after, 1:], axis=1).max()
