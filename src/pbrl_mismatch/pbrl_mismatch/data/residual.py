@@ -105,7 +105,8 @@ def residual_wrench(
     elif memory is None:
         memory = max(tried, key=lambda each: _smooth(track, row, size, each, stride, back=False)[2])
     mean, spread, value = _smooth(track, row, size, memory, stride, back=True)
-    unknown = in_missing(track.clock, track.missing, memory)
+    # How far what is missing reaches is said by the data that are there and not by the memory, which may last a push.
+    unknown = in_missing(track.clock, track.missing, min(memory, MEMORY))
     mean[unknown, 6:] = 0.0
     spread[unknown, 6:, 6:] += UNKNOWN_FORCE**2 * np.diag([1.0, 1.0, track.gyration**2])
     return ResidualWrench(

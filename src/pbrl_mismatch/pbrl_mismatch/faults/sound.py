@@ -117,7 +117,7 @@ def missing_notes(track: Track) -> tuple[str, ...]:
             times = f"t = {own[0].start:.2f} to {own[0].end:.2f} s"
             more = f" and {len(own) - 1} more times" if len(own) > 1 else ""
             share = 100.0 * lost / track.seconds
-            notes.append(f"{why} at {times}{more}: {lost:.1f} s, {share:.0f} % of what was held, are left out.")
+            notes.append(f"{why} at {times}{more}: {lost:.1f} s, {share:.0f} % of what was held, are left out")
     return tuple(notes)
 
 
