@@ -16,7 +16,7 @@ from pbrl_bringup.debian import ensure_program
 from pbrl_bringup.diagnosis.models import write_models
 from pbrl_bringup.diagnosis.page import render_diagnosis
 from pbrl_bringup.diagnosis.replay import replay_of
-from pbrl_bringup.diagnosis.told import experiment, sentences
+from pbrl_bringup.diagnosis.told import experiment, forecast_caution, sentences
 from pbrl_mismatch import EFFECTS, DiagnoseOptions, diagnose
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.repaired import load_repaired, simulate_recorded
@@ -53,6 +53,7 @@ slider.value = 500; slider.dispatchEvent(new Event("input")); note("half", at())
 note("moved", shape(".recording .body")); note("true", shape(".simulation .after:not(.trail)"));
 find(".enlarge").click(); note("larger", shape(".simulation .after:not(.trail)")); find(".enlarge").click();
 note("said", find(".now").textContent);
+note("doubted", document.querySelectorAll(".strip .unbelieved").length);
 key("End"); note("end", at());
 note("wide", document.documentElement.scrollWidth <= innerWidth);
 key("Home"); key(" "); note("playing", find(".play").getAttribute("aria-label"));
@@ -122,10 +123,26 @@ def test_the_replay_obeys(page: str, tmp_path: Path) -> None:
     assert log["half"] == pytest.approx(0.5 * log["end"], abs=0.06) and log["end"] > 20.0
     assert log["start"] != log["moved"] and log["true"] != log["larger"]
     assert "before the repair" in log["said"] and "repaired" in log["said"]
+    assert log["doubted"] == 0
     assert log["playing"] == "pause" and log["paused"] == "play"
     assert 0.3 < log["later"] < 3.0 and log["stood"]
     assert log["wide"], "nothing sticks out of the window"
     assert not any("NaN" in str(value) for value in log.values())
+
+
+def test_what_is_not_believed_is_shown_and_said(page: str, tmp_path: Path) -> None:
+    assert "not to be believed" not in page
+    doubted = page.replace('"unbelieved":[]', '"unbelieved":[[0.0,60.0,"the tag was lost"]]')
+    log = dict(driven(doubted, tmp_path))
+    assert log["doubted"] == 1 and "Left out now: the tag was lost." in log["said"]
+
+
+def test_a_reader_is_told_of_a_repair_that_forecasts_worse() -> None:
+    def report(before: float | None, after: float | None) -> dict[str, Any]:
+        return {"heldout": {"rmse_position_m": {"baseline": before, "repaired": after}}}
+
+    assert forecast_caution({}) == forecast_caution(report(None, None)) == forecast_caution(report(0.02, 0.021)) == ""
+    assert "2.5 times as far off" in forecast_caution(report(0.02, 0.05))
 
 
 def driven(page: str, tmp_path: Path) -> list[Any]:

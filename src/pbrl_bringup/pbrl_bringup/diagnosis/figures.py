@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pbrl_bag.types import BodyGeometry
 from pbrl_bringup.diagnosis.told import acting_legend, acting_times
 from pbrl_control.planar import placed
+from pbrl_mismatch.data.missing import in_missing
 from pbrl_mismatch.data.residual import ResidualWrench
 from pbrl_mismatch.diagnose import ObjectDiagnosis
 
@@ -26,6 +27,8 @@ EVERY, OUTLINE_EVERY = 0.3, 2.0
 """Between arrows, and between outlines, on the floor [s]."""
 SURE = 6.0
 """Standard deviations at which an arrow's colour is full."""
+BESIDE = 0.5
+"""For so long before and after a missing stretch what is left out is hardly told either [s]."""
 SHOWN = 8
 BLUE, ORANGE, GREY, PURPLE = "#0067a8", "#c45500", "#8a9096", "#a3377a"
 ON_THE_FLOOR = ("world", "floor")
@@ -99,10 +102,13 @@ def _where(axes: Axes, entry: Mapping[str, Any], last: Array) -> None:
 def over_time(found: ObjectDiagnosis) -> str:
     """Draw the left-out wrench over time with two standard deviations, and when effects begin and end."""
     residual = found.residual
+    missing = found.baseline.peak.objective.cuts.track.missing
     figure = Figure(figsize=(11.0, 5.0), layout="constrained")
     rows = figure.subplots(3, 1, sharex=True)
     time = residual.time - residual.time[0]
     spread = 2.0 * np.sqrt(np.einsum("tii->ti", residual.covariance))
+    # What is missing is told to within kilonewtons: an axis that shows those shows nothing else.
+    known = ~in_missing(residual.time, missing, BESIDE) if missing else np.ones(len(time), dtype=bool)
     names = ("force to the right [N]", "force away [N]", "turning moment [N m]")
     for k, (axes, name) in enumerate(zip(rows, names, strict=True)):
         axes.spines[["top", "right"]].set_visible(False)
@@ -112,11 +118,18 @@ def over_time(found: ObjectDiagnosis) -> str:
             axes.plot(time[part], residual.world[part, k], color=ORANGE, lw=1.2)
         axes.axhline(0.0, color="black", lw=0.6)
         axes.set_ylabel(name, fontsize=8)
+        if missing and known.any():
+            low, high = (residual.world[known, k] + sign * spread[known, k] for sign in (-1.0, 1.0))
+            axes.set_ylim(*(1.05 * np.array([min(low.min(), 0.0), max(high.max(), 0.0)])))
         for start, end in acting_times(found.report):
             axes.axvspan(start - residual.time[0], end - residual.time[0], color=PURPLE, alpha=0.12, lw=0)
+        for each in missing:
+            start, end = each.start - residual.time[0], each.end - residual.time[0]
+            axes.axvspan(start, end, facecolor="white", edgecolor=GREY, hatch="////", lw=0, zorder=2.5)
     legend = acting_legend(found.report)
     shaded = f"; shaded: when {legend}" if legend else ""
-    rows[-1].set_xlabel(f"seconds since the first grasp{shaded}")
+    hatched = "; hatched: left out, not to be believed" if missing else ""
+    rows[-1].set_xlabel(f"seconds since the first grasp{shaded}{hatched}")
     return _svg(figure)
 
 

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from pbrl_bag.types import Recording
 from pbrl_bringup.diagnosis.figures import floor, held_out, odds, over_time
 from pbrl_bringup.diagnosis.replay import Replay, replay_of
-from pbrl_bringup.diagnosis.told import Told, acting_legend, told_of_all, told_of_object
+from pbrl_bringup.diagnosis.told import Told, acting_legend, forecast_caution, told_of_all, told_of_object
 from pbrl_bringup.files import write_text
 from pbrl_bringup.report_page import TEMPLATES, number, rounded
 from pbrl_mismatch.diagnose import Diagnosis, ObjectDiagnosis
@@ -32,11 +32,13 @@ class Part:
         repaired: whether there is a repaired model beside the baseline.
         places: whether what is named has a place.
         moments: what the moments are that are shaded, or nothing.
+        unbelieved: whether stretches are left out because they are not to be believed.
         stretch: length of what is simulated at a time [s].
         floor: figure, an SVG element, and so are the next three.
         over_time: see `figures`.
         odds: see `figures`.
         held_out: see `figures`.
+        caution: what to mind where the repair forecasts worse, or nothing.
         told: headings with sentences.
         model_file: name of the saved model, or nothing.
     """
@@ -47,11 +49,13 @@ class Part:
     repaired: bool
     places: bool
     moments: str
+    unbelieved: bool
     stretch: float
     floor: Markup
     over_time: Markup
     odds: Markup
     held_out: Markup
+    caution: str
     told: Told
     model_file: str
 
@@ -103,11 +107,13 @@ def _part(recording: Recording, name: str, found: ObjectDiagnosis, replay: Repla
         replay.after is not None,
         bool(replay.places),
         acting_legend(found.report),
+        bool(replay.unbelieved),
         float(np.median(replay.time[ends] - replay.time[starts])),
         Markup(floor(recording.bodies[name], found)),
         Markup(over_time(found)),
         Markup(odds(found)),
         Markup(held_out(found)),
+        forecast_caution(found.report),
         told_of_object(found.report),
         model,
     )

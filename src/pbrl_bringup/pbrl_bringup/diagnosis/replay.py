@@ -43,6 +43,7 @@ class Replay:
         force: (n, 2) felt force on the object, world axes [N].
         hand: (n, 2) where it was held [m].
         held_out: intervals of time that are left out where errors are scored [s].
+        unbelieved: stretches that nothing is simulated across: start, end [s], and what was wrong.
         seconds: length of a stretch [s].
         places: of named effects: name, whether it moves with the body, outline [m].
         moments: intervals in which named effects act, or what has no name is surely there [s].
@@ -60,6 +61,7 @@ class Replay:
     force: Array
     hand: Array
     held_out: tuple[tuple[float, float], ...]
+    unbelieved: tuple[tuple[float, float, str], ...]
     seconds: float
     places: tuple[tuple[str, bool, Array], ...]
     moments: tuple[tuple[float, float], ...]
@@ -79,6 +81,7 @@ class Replay:
             "force": _rounded(self.force, 2),
             "hand": _rounded(self.hand, 3),
             "heldOut": [list(each) for each in self.held_out],
+            "unbelieved": [[round(start, 3), round(end, 3), why] for start, end, why in self.unbelieved],
             "seconds": self.seconds,
             "places": [
                 {"effect": name, "onBody": moves, "shape": _rounded(shape, 3)} for name, moves, shape in self.places
@@ -133,6 +136,7 @@ def replay_of(recording: Recording, found: ObjectDiagnosis, options: DiagnoseOpt
         force=force,
         hand=track.seen[step, :2] + mount[:, 2:],
         held_out=_held_out(cuts, options, origin),
+        unbelieved=tuple((each.start - origin, each.end - origin, each.why) for each in track.missing),
         seconds=options.block,
         places=tuple(_places(effects, track.object)),
         moments=tuple((start - origin, end - origin) for start, end in acting_times(found.report)),

@@ -99,6 +99,7 @@ function drawStrip(svg, data, errors) {
   const band = ([a, b], kind) => element(svg, "rect", { class: kind, x: x(Math.max(a, 0)), y: top, width: Math.max(x(Math.min(b, end)) - x(Math.max(a, 0)), 0), height: height - top - bottom });
   data.heldOut.forEach((each) => band(each, "heldout"));
   data.moments.forEach((each) => band(each, "acting"));
+  data.unbelieved.forEach((each) => band(each, "unbelieved"));
   for (let e = 0, step = niceStep(most, 3); e <= most; e += step) {
     element(svg, "path", { class: "grid", d: `M${left} ${y(e).toFixed(1)}H${width - right}` });
     element(svg, "text", { x: left - 8, y: y(e) + 4, "text-anchor": "end" }, e ? length(e) : "0");
@@ -140,7 +141,9 @@ function makeReplay(section) {
       number.textContent = length(errors[kind][k]);
       now.append(`${i ? "; " : ""}${kind === "before" ? (data.after ? "before the repair" : "the model") : "repaired"} `, number, `, ${turned}\u00b0`);
     });
-    now.append(time - data.time[k] > APART ? ". It is not held now; what is seen is the last moment before." : ".");
+    const doubted = data.unbelieved.find(([start, end]) => start <= time && time <= end), shown = " What is seen is the last moment before.";
+    if (doubted) now.append(`. Left out now: ${doubted[2]}.${shown}`);
+    else now.append(time - data.time[k] > APART ? `. It is not held now.${shown}` : ".");
   }
 
   function key(event) {
