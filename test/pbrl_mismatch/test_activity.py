@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from pbrl_bag.types import Recording
 from pbrl_mismatch import MismatchError, track_of
-from pbrl_mismatch.activity import GAP, activity, intervals, without, wrench_sizes
+from pbrl_mismatch.activity import GAP, NEAR, activity, intervals, without, wrench_sizes
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 
 MASS = 20.0
@@ -58,6 +59,41 @@ def test_a_cord_acts_where_it_is_taut(track: Any) -> None:
     reach = float(away.max()) - slack  # below a small share of the pull at its strongest it does not count
     assert found[away > slack + 0.05 * reach].all()
     assert found[away < slack - 0.02].mean() < 0.1  # pauses that are bridged
+
+
+def test_what_was_touched_is_touched_until_the_path_is_away(track: Any) -> None:
+    def post(off: float) -> np.ndarray:
+        """A disc of 10 cm whose border is `off` the footprint, right of it, in the middle of the first episode."""
+        return table_row(obstacle_stiffness=2e4, obstacle_x=side[0] + off + 0.1, obstacle_y=side[1], obstacle_radius=0.1)
+
+    at = int(track.begin[0] + track.last[0]) // 2
+    c, s = np.cos(track.seen[at, 2]), np.sin(track.seen[at, 2])
+    corners = (track.outline - track.body[1:3]) @ np.array([[c, s], [-s, c]]) + track.seen[at, :2]
+    side = corners[np.argmax(corners[:, 0])]
+    touched = activity(track, post(-1e-3), ["hidden_obstacle"])["hidden_obstacle"]
+    size = wrench_sizes(track, post(-1e-3), ["hidden_obstacle"])["hidden_obstacle"]
+    assert touched and size is not None and inside(track, touched)[size > 1.0].all()
+    nearer = wrench_sizes(track, post(-1e-3 - NEAR), ["hidden_obstacle"])["hidden_obstacle"]
+    assert nearer is not None and not inside(track, touched)[nearer == 0.0].mean() > 0.05  # pauses that are bridged
+
+
+def test_a_path_that_keeps_off_what_it_must_have_touched_is_taken_to_be_off(track: Any) -> None:
+    x, y = track.seen[:, 0].max() + np.hypot(*np.abs(track.outline).max(axis=0)) + 0.5, track.seen[:, 1].mean()
+    gap = _gap(track, x, y)
+    for short, acts in ((0.008, True), (0.1, False)):
+        row = table_row(obstacle_stiffness=2e4, obstacle_x=x, obstacle_y=y, obstacle_radius=gap - short)
+        assert bool(activity(track, row, ["hidden_obstacle"])["hidden_obstacle"]) is acts
+
+
+def _gap(track: Any, x: float, y: float) -> float:
+    """Return how near (x, y) comes to the footprint [m]."""
+    place = shapely.Point(x, y)
+    least = np.inf
+    for px, py, angle in track.seen[:, :3]:
+        c, s = np.cos(angle), np.sin(angle)
+        corners = (track.outline - track.body[1:3]) @ np.array([[c, s], [-s, c]]) + [px, py]
+        least = min(least, shapely.Polygon(corners).distance(place))
+    return float(least)
 
 
 def test_friction_that_breaks_away_acts_where_feet_are_slow_and_leaves_sliding_friction_on(track: Any) -> None:

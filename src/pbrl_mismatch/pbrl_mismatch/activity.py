@@ -33,6 +33,12 @@ STRONG = 0.95
 """Quantile of an effect's sizes that are above the floor which is its strong moment."""
 GAP, LEAST = 0.3, 0.05
 """Pauses shorter than the first are bridged, bouts shorter than the second dropped [s]."""
+NEAR = 3e-3
+"""What was touched is touched until it is so far away [m]: smoothed poses are off by a millimetre, alike for a second,
+and a stiff contact on and off with them."""
+FURTHEST = 0.02
+"""Where the whole path keeps off what it must have touched, it is taken to be off by as little as makes it touch, and
+by no more than this [m]: so rough an outline may be."""
 UNSEEN_IN_FORCE = frozenset({"pose_bias", "time_offset", "grasp_compliance"})
 """Effects on what is seen, not on what moves: they act whenever the body is observed."""
 
@@ -57,8 +63,15 @@ def activity(
     """
     if not (math.isfinite(floor) and floor > 0.0):
         raise MismatchError(f"activity: expected a floor above zero, got {floor}")
-    sizes = wrench_sizes(track, row, effects)
-    return {name: None if size is None else intervals(track, _counts(size, floor)) for name, size in sizes.items()}
+    found: dict[str, tuple[Interval, ...] | None] = dict.fromkeys(effects)
+    for name, size in wrench_sizes(track, row, effects).items():
+        if size is not None:
+            acting = _counts(size, floor)
+            touches = effect_named(name).touches
+            found[name] = intervals(
+                track, acting if touches is None else _touching(track, row, name, touches[2], acting, floor)
+            )
+    return found
 
 
 def wrench_sizes(track: Track, row: Array, effects: Sequence[str]) -> dict[str, Array | None]:
@@ -121,6 +134,37 @@ def intervals(track: Track, acting: NDArray[np.bool_]) -> tuple[Interval, ...]:
                 bouts.append([first, until])
         found += [(first, until) for first, until in bouts if until - first >= LEAST]
     return tuple(found)
+
+
+def _touching(
+    track: Track, row: Array, name: str, radius: str, acting: NDArray[np.bool_], floor: float
+) -> NDArray[np.bool_]:
+    """Return (T,) where a contact acts: for as long as the path stays near after, and before, it acts along it.
+
+    Args:
+        track: what was recorded.
+        row: (WIDTH,) parameter row.
+        name: of the effect.
+        radius: column of the size of what is touched.
+        acting: (T,) where it acts along the path as that was smoothed.
+        floor: see `activity`.
+    """
+
+    def reached(further: float) -> NDArray[np.bool_]:
+        larger = row.copy()
+        larger[COLUMN[radius]] += further
+        size = wrench_sizes(track, larger, [name])[name]
+        return np.zeros_like(acting) if size is None else size > floor
+
+    off = 0.0
+    while not acting.any() and off < FURTHEST:
+        off += NEAR
+        acting = reached(off)
+    near, kept = acting | reached(2.0 * off + NEAR), np.zeros_like(acting)
+    for begin, last in zip(track.begin, track.last, strict=True):
+        for start, end in runs_of(near[begin : last + 1]):
+            kept[begin + start : begin + end] = acting[begin + start : begin + end].any()
+    return kept
 
 
 def _counts(size: Array, floor: float) -> NDArray[np.bool_]:
