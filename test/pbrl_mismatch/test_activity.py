@@ -64,7 +64,8 @@ def test_a_cord_acts_where_it_is_taut(track: Any) -> None:
 def test_what_was_touched_is_touched_until_the_path_is_away(track: Any) -> None:
     def post(off: float) -> np.ndarray:
         """A disc of 10 cm whose border is `off` the footprint, right of it, in the middle of the first episode."""
-        return table_row(obstacle_stiffness=2e4, obstacle_x=side[0] + off + 0.1, obstacle_y=side[1], obstacle_radius=0.1)
+        x, y = side
+        return table_row(obstacle_stiffness=2e4, obstacle_x=x + off + 0.1, obstacle_y=y, obstacle_radius=0.1)
 
     at = int(track.begin[0] + track.last[0]) // 2
     c, s = np.cos(track.seen[at, 2]), np.sin(track.seen[at, 2])
