@@ -119,6 +119,16 @@ def test_each_effect_of_two_is_asked_alone(track: Any) -> None:
     assert off[COLUMN["steady_x"]] == 0.0 and off[COLUMN["slope_x"]] == 0.01
 
 
+def test_a_centre_of_mass_or_a_tag_that_is_off_moves_no_other_effect(track: Any) -> None:
+    anchor = track.seen[0, :2] + [0.3, 0.2]
+    cord = {"tether_stiffness": 400.0, "tether_x": anchor[0], "tether_y": anchor[1], "tether_length": 0.2}
+    size = wrench_sizes(track, table_row(**cord), ["tether"])["tether"]
+    off = wrench_sizes(track, table_row(com_x=-0.1, com_y=0.15, **cord), ["tether"])["tether"]
+    assert size is not None and off is not None and (size > 0.0).any()
+    # The same force turns a body about another centre more or less, but pulls when it did.
+    np.testing.assert_array_equal(off > 0.0, size > 0.0)
+
+
 def test_below_the_floor_nothing_acts_and_what_no_force_shows_has_no_times(track: Any) -> None:
     found = activity(track, table_row(steady_x=0.1, time_offset=0.2), ["external_force", "time_offset"])
     assert found == {"external_force": (), "time_offset": None}

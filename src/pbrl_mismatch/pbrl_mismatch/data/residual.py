@@ -170,12 +170,12 @@ def _smooth(
 
 
 def accelerations(track: Track, rows: Array, path: Array, stride: int) -> Array:
-    """Return how each model would accelerate the body along a given path.
+    """Return how each model would accelerate the body's centre of mass along a given path.
 
     Args:
         track: what was recorded.
         rows: (P, WIDTH).
-        path: (T, 6) states of the centre of mass.
+        path: (T, 6) states of the nominal centre of mass, as tags would see it.
         stride: every so many steps.
 
     Returns:

@@ -222,7 +222,7 @@ def pushes_along(
 
     Args:
         rows: (P, WIDTH).
-        path: (T, 6) states of the true centre of mass in one episode.
+        path: (T, 6) states of the nominal centre of mass in one episode, as tags would see it.
         felt: see `simulate_serial`, and so are those up to `feet`.
         mount: see `simulate_serial`.
         seen: see `simulate_serial`.
@@ -244,11 +244,14 @@ def pushes_along(
         rehearse(p, seen, span, body, outline, feet, com, state)
         for n in range(out.shape[1]):
             t = n * stride
-            state[:6] = path[t]
+            step = min(span[0] + t, span[LAST])
+            _, _ = load_now(p, clock[step], body, com)
+            to_truth(p, path[t], body, com, state)
+            vx, vy, omega = state[3], state[4], state[5]
             step_seen(
                 p,
                 state,
-                min(span[0] + t, span[LAST]),
+                step,
                 felt,
                 mount,
                 seen,
@@ -265,5 +268,6 @@ def pushes_along(
                 room,
                 wrench,
             )
-            for k in range(3):
-                out[r, n, k] = (state[3 + k] - path[t, 3 + k]) / body[3]
+            out[r, n, 0] = (state[3] - vx) / body[3]
+            out[r, n, 1] = (state[4] - vy) / body[3]
+            out[r, n, 2] = (state[5] - omega) / body[3]
