@@ -45,6 +45,7 @@ EFFECT = Effect(
             "obstacle_x",
             "obstacle_y",
             "obstacle_radius",
+            "obstacle_friction",
             "obstacle_angle",
         ),
     ),
