@@ -127,6 +127,19 @@ def test_patch_brakes_only_inside(bench: Any) -> None:
     assert np.median(slowing) == pytest.approx(-0.1 * GRAVITY / 2, rel=0.02)  # two feet of four
 
 
+def test_a_wheel_on_a_patch_is_held_back_along_its_way_and_across_as_before(bench: Any) -> None:
+    patch = {"patch_roll": 0.03, "patch_x": 1.5, "patch_length": 0.5, "patch_width": 2.0}
+    wheel = {"cone": 1.0, "wheel_x": 0.2, "mu_x": 1e-4, "mu_y": 0.2}
+    path = bench(pushed(0.0, 150), moving(0.8)).run(**wheel, **patch)
+    before, on = path[:-1, 0] + 0.2 < 0.97, (path[:-1, 0] + 0.2 > 1.05) & (path[:-1, 0] + 0.2 < 1.9)
+    slowing = np.diff(speeds(path)[:, 0]) / DT
+    n = len(slowing)
+    assert np.median(slowing[before[:n]]) == pytest.approx(-1e-4 * GRAVITY, abs=2e-3)
+    assert np.median(slowing[on[:n]]) == pytest.approx(-0.03 * GRAVITY, rel=0.02)
+    aside = bench(pushed(0.0, 30), np.array([1.5, 0.0, 0.0, 0.0, 0.3, 0.0]))
+    np.testing.assert_allclose(aside.run(**wheel, **patch), aside.run(**wheel), atol=2e-3)
+
+
 def test_slope_pulls_by_the_weight(bench: Any) -> None:
     path = bench(pushed(0.0)).run(slope_x=0.01, slope_y=-0.02)
     t = 2.0

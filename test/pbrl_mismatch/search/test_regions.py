@@ -60,7 +60,9 @@ def held(
 
 def test_friction_is_found_on_the_tiles_that_have_it(clean: Any, lacking: ResidualWrench) -> None:
     edge = float(np.median(lacking.state[:, 0]))
-    tiles, friction = tile_friction(clean, held(clean, lacking, lambda place: place[:, 0] > edge), WEIGHT)
+    tiles, friction = tile_friction(
+        clean, held(clean, lacking, lambda place: place[:, 0] > edge), WEIGHT, neutral_row()
+    )
     beyond, before = tiles[:, 0] > edge + 0.1, tiles[:, 0] < edge - 0.1
     assert beyond.any() and before.any()
     assert np.median(friction[beyond]) == pytest.approx(FRICTION, rel=0.15)
@@ -68,7 +70,7 @@ def test_friction_is_found_on_the_tiles_that_have_it(clean: Any, lacking: Residu
 
 
 def test_nothing_lacking_is_no_friction(clean: Any, lacking: ResidualWrench) -> None:
-    _, friction = tile_friction(clean, lacking, WEIGHT)
+    _, friction = tile_friction(clean, lacking, WEIGHT, neutral_row())
     assert np.all(friction == 0.0)
     draws = np.zeros((20, 5))
     still = with_regions(np.random.default_rng(0), draws, (0, 1, 2, 3, 4), np.zeros((3, 2)), np.zeros(3))
@@ -107,7 +109,7 @@ def test_a_ground_that_a_patch_has_bent_still_says_where_the_patch_is(
     bent = ground.coordinates + np.log(heavier) * (
         np.array([column == "mass" for column in wheel.columns], dtype=float) - np.isin(wheel.columns, OF_FRICTION)
     )
-    tiles, friction = tile_friction(track, replace(ground, coordinates=bent).believed, WEIGHT)
+    tiles, friction = tile_friction(track, replace(ground, coordinates=bent).believed, WEIGHT, ground.row)
     x, y, turn = track.seen[0, :3]
     c, s = math.cos(turn), math.sin(turn)
     own = (tiles - [x, y]) @ np.array([[c, -s], [s, c]])

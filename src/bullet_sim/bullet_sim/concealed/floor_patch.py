@@ -74,8 +74,8 @@ class FloorPatch(Effect):
                 counted += self._roll(body)
             if body.name in self._blocks:
                 counted.append(self._slide(body))
+            counted += self._brake_struts(body)
             self._inside[body.name] = sum(counted) / max(1, len(counted))
-            self._brake_struts(body)
 
     def _roll(self, body: Furniture) -> list[float]:
         """Set the rolling resistance of casters."""
@@ -101,11 +101,11 @@ class FloorPatch(Effect):
             self._client.api.changeDynamics(number, link, lateralFriction=friction)
         return float(share)
 
-    def _brake_struts(self, body: Furniture) -> None:
-        """Set the rolling resistance of wheels on struts."""
+    def _brake_struts(self, body: Furniture) -> list[float]:
+        """Set the rolling resistance of wheels on struts, and tell which are on the tile."""
         wheels = [fitting for fitting in body.fittings if isinstance(fitting, Strut) and fitting.rolls]
         if not wheels:
-            return
+            return []
         motion = self._motions[body.name]
         motion.look()
         for wheel in wheels:
@@ -113,6 +113,7 @@ class FloorPatch(Effect):
             if on != (wheel in self._braked):
                 self._braked ^= {wheel}
                 wheel.set_lever(self._settings.rolling_resistance if on else wheel.lever)
+        return [float(wheel in self._braked) for wheel in wheels]
 
     def strength(self) -> float:
         """Give the largest share of a body's feet or wheels that is on the tile."""

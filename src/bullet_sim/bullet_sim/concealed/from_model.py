@@ -71,10 +71,11 @@ class Told:
         """Share of the weight that slides on feet, 0..1: wheels on struts carry the rest."""
         if isinstance(self.body, OnCasters):
             return float(OnGlides.model_fields["load_share"].default)
-        wheels = [self._load(key) for key in ("", "2") if f"wheel{key}_x" in self.values]
+        wheels = [self.load(key) for key in ("", "2") if f"wheel{key}_x" in self.values]
         return max(1.0 - sum(wheels) / self.weight, 0.2)
 
-    def _load(self, key: str) -> float:
+    def load(self, key: str) -> float:
+        """Return what bears on a wheel [N]: the first, "", or the second, "2"."""
         along, across = _frictions(self, key)
         return max(LEAST_LOAD, max(along, across) * self.weight / TREAD)
 
@@ -156,7 +157,10 @@ def _floor_patch(told: Told) -> dict[str, Any]:
     half = [(a * told["patch_length"], b * told["patch_width"]) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     corners = [[x + c * a - s * b, y + s * a + c * b] for a, b in half]
     own = told.get("slide_mu") + told.get("mu_ground")
-    return {"floor_patch": [{"polygon": corners, "friction": max(own + told["patch_mu"], 0.0) / told.on_feet}]}
+    tile = {"polygon": corners, "friction": max(own + told["patch_mu"], 0.0) / told.on_feet}
+    if "patch_roll" in told.values and "wheel_x" in told.values:
+        tile["rolling_resistance"] = told["patch_roll"] * told.weight * WHEEL_RADIUS / told.load("")
+    return {"floor_patch": [tile]}
 
 
 def _floor_slope(told: Told) -> dict[str, Any]:

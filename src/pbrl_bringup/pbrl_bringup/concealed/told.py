@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bullet_sim.concealed.floor_patch import FloorPatchSettings
 from bullet_sim.concealed.truth import wheel_truth
 from bullet_sim.scene import Scene
 from pbrl_bringup.concealed.draws import CRATE
@@ -88,8 +89,11 @@ def _patch(told: Any, scene: Scene, mass: float) -> dict[str, float]:
     turn = math.atan2(first[1], first[0])
     # A rectangle is the same turned by half a turn; its prior is about no turn.
     turn -= math.pi * round(turn / math.pi)
+    wheel = scene.concealed.wheel.get(NAME)
+    lever = told.get("rolling_resistance", FloorPatchSettings.model_fields["rolling_resistance"].default)
     return {
         "patch_mu": told["friction"],
+        **({} if wheel is None else {"patch_roll": lever / wheel.radius * wheel.load / (mass * GRAVITY)}),
         "patch_x": float(middle[0]),
         "patch_y": float(middle[1]),
         "patch_length": float(np.hypot(*first)) / 2.0,

@@ -14,6 +14,8 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         positive("patch_length", 0.6, 0.7),
         positive("patch_width", 0.6, 0.7),
         plain("patch_theta", 0.0, 0.8),
+        positive("patch_roll", 0.02, 1.0),
+        positive("slide_extent", 1.0, 0.1),
         plain("load_x", 0.0, 0.3 * float(scene.half[0])),
         plain("load_y", 0.0, 0.3 * float(scene.half[1])),
         positive("load_height", 0.5, 0.7),
@@ -35,7 +37,7 @@ def where(values: Values, scene: Scene) -> Where | None:
 EFFECT = Effect(
     name="floor_patch",
     summary="A region of the floor, such as a carpet, has friction of its own, with a border.",
-    equation="friction mu_p at each load-carrying point that lies in a rectangle on the floor",
+    equation="friction mu_p at each foot in a rectangle on the floor; a wheel there rolls against roll m g",
     shows="The border must be crossed, by some points before others; go back over it from another side.",
     parameters=parameters,
     variants=(
@@ -46,6 +48,8 @@ EFFECT = Effect(
             "patch_length",
             "patch_width",
             "patch_theta",
+            "patch_roll",
+            "slide_extent",
             "load_x",
             "load_y",
             "load_height",
@@ -55,7 +59,7 @@ EFFECT = Effect(
     place=("patch_x", "patch_y"),
     direction="velocity",
     angles=("patch_theta",),
-    linear=("patch_mu",),
+    linear=("patch_mu", "patch_roll"),
     region=("patch_x", "patch_y", "patch_length", "patch_width", "patch_theta"),
     sticks=True,
 )

@@ -6,7 +6,8 @@ each axis alone, as the thesis and `pbrl_model.kernel` do; 1 limits both togethe
 does. A `mu_y` or `wheel2_mu_y` below zero stands for one that is the same as that along x, a
 `torque_scale` below zero for one that is the same as `force_scale`. `load_x`, `load_y` are where the feet's load is
 centred, off their middle; a force at the height `load_height` over the floor moves it on. `payload_gone` 1 stands for
-a load that is there from the start and is taken off.
+a load that is there from the start and is taken off. `patch_roll` is what holds back the
+baseline's wheel on the patch at least, along either axis, over the body's weight.
 
 The last `SPARE` columns are for laws that a user adds: `name_columns` gives some of them names and units.
 """
@@ -43,6 +44,7 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("patch_length", "m", 1.0),
     ("patch_width", "m", 1.0),
     ("patch_theta", "rad", 0.0),
+    ("patch_roll", "1", 0.0),
     ("slope_x", "rad", 0.0),
     ("slope_y", "rad", 0.0),
     ("com_x", "m", 0.0),

@@ -18,7 +18,16 @@ from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP
 from pbrl_mismatch.kernels.contact_kernel import contacts
 from pbrl_mismatch.kernels.crate_kernel import CRUSHING, move_crate
-from pbrl_mismatch.kernels.laws_kernel import dry, lay_feet, on_casters, on_feet, resistances, springs, swivel
+from pbrl_mismatch.kernels.laws_kernel import (
+    dry,
+    lay_feet,
+    on_casters,
+    on_feet,
+    patch_share,
+    resistances,
+    springs,
+    swivel,
+)
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
 from pbrl_model.kernel import ERROR_BIAS, GRAVITY, SINGULAR, box_impulses, cos_sin, joint_rows
 
@@ -130,6 +139,11 @@ def hold(
         k11 = inverse_mass + lever1 * lever1 * inverse_inertia
         floor0, floor1 = SINGULAR * k00, SINGULAR * k11
         ex, ey = c * wc - s * ws, s * wc + c * ws
+        if p[at.PATCH_ROLL] > 0.0:
+            # A carpet holds back what rolls over it; what slides is held by the tread as before, if that was more.
+            x, y = state[0] + c * wx - s * wy, state[1] + s * wx + c * wy
+            least = p[at.PATCH_ROLL] * limit * patch_share(p, axes[5], axes[6], x, y)
+            limit0, limit1 = max(limit0, least), max(limit1, least)
         g00 = g01 = g10 = g11 = 0.0
         if hinge:
             q00 = (n0x * ex + n0y * ey) * inverse_mass + l0 * lever0 * inverse_inertia

@@ -1,7 +1,8 @@
 """Where a floor may hold feet back: the wrench that a model lacks, as the friction of floor tiles that feet stood on.
 
-Each foot's friction is along its velocity and as its load; which foot stood on which tile is known. What is left is a
-regression with coefficients that are not negative (Lawson and Hanson 1974), and rectangles about the tiles that hold.
+Each foot's friction is along its velocity and as its load, a wheel's along the way that it rolls; which of them stood
+on which tile is known. What is left is a regression with coefficients that are not negative (Lawson and Hanson 1974),
+and rectangles about the tiles that hold.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from shapely.geometry import MultiPoint
 
 from pbrl_mismatch.data.residual import ResidualWrench
 from pbrl_mismatch.data.track import Track
+from pbrl_mismatch.kernels.columns import COLUMN
 
 Array = NDArray[np.float64]
 
@@ -36,29 +38,35 @@ WIDER = 0.03
 """Least half of a region's side [m]."""
 
 
-def tile_friction(track: Track, residual: ResidualWrench, weight: float) -> tuple[Array, Array]:
+def tile_friction(track: Track, residual: ResidualWrench, weight: float, row: Array) -> tuple[Array, Array]:
     """Return middles of tiles (n, 2) that feet slid over [m], and the friction coefficient of each (n,).
 
     Args:
         track: with the feet.
         residual: what a model lacks, of a model as it was believed to be.
         weight: of the body [N].
+        row: (WIDTH,) of that model, for its wheel.
     """
     rows = np.arange(0, len(residual.time), EVERY)
     x, y, turn, vx, vy, omega = residual.state[rows].T
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
-    feet = track.feet - track.body[1:3]
-    rx, ry = c * feet[:, 0] - s * feet[:, 1], s * feet[:, 0] + c * feet[:, 1]
+    wheel, rolls = _rolling(row)
+    points = np.vstack([track.feet, wheel]) - track.body[1:3]
+    rx, ry = c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]
     ux, uy = vx[:, None] - omega[:, None] * ry, vy[:, None] + omega[:, None] * rx
+    for k in range(len(track.feet), len(points)):
+        ex, ey = (c * rolls[0] - s * rolls[1])[:, 0], (s * rolls[0] + c * rolls[1])[:, 0]
+        way = ux[:, k] * ex + uy[:, k] * ey
+        ux[:, k], uy[:, k] = way * ex, way * ey
     speed = np.hypot(ux, uy)
-    load = weight / len(feet) * (speed > SLIDES) / np.maximum(speed, SLIDES)
+    load = weight / len(track.feet) * (speed > SLIDES) / np.maximum(speed, SLIDES)
     push = np.stack([-ux * load, -uy * load, -(rx * uy - ry * ux) * load], -1)
     place = np.stack([x[:, None] + rx, y[:, None] + ry], -1)
     tiles, owner = np.unique(np.floor(place / TILE).astype(np.int64).reshape(-1, 2), axis=0, return_inverse=True)
     owner = owner.reshape(place.shape[:2])
     matrix = np.zeros((len(rows), 3, len(tiles)))
-    for foot in range(len(feet)):
-        np.add.at(matrix, (np.arange(len(rows))[:, None], np.arange(3), owner[:, foot, None]), push[:, foot])
+    for k in range(len(points)):
+        np.add.at(matrix, (np.arange(len(rows))[:, None], np.arange(3), owner[:, k, None]), push[:, k])
     unsure, turned = np.linalg.eigh(residual.covariance[rows])
     whiten = np.swapaxes(turned, -1, -2) / np.maximum(np.sqrt(np.maximum(unsure, 0.0)), SUREST)[..., None]
     matrix = (whiten @ matrix).reshape(-1, len(tiles))
@@ -67,6 +75,15 @@ def tile_friction(track: Track, residual: ResidualWrench, weight: float) -> tupl
     found, _ = nnls(np.vstack([matrix, ridge]), np.concatenate([target, np.zeros(len(tiles))]))
     middles = (tiles + 0.5) * TILE
     return np.asarray(middles, dtype=np.float64), np.asarray(found, dtype=np.float64)
+
+
+def _rolling(row: Array) -> tuple[Array, Array]:
+    """Return the place (1, 2) of a model's wheel [m], or none, and the way that it rolls (2,), in the body's frame."""
+    along, across = row[COLUMN["mu_x"]], row[COLUMN["mu_y"]]
+    if across <= 0.0 or along <= 0.0:  # none, or one that does not roll
+        return np.empty((0, 2)), np.zeros(2)
+    angle = row[COLUMN["wheel_theta"]] + (0.0 if along < across else 0.5 * math.pi)
+    return row[[COLUMN["wheel_x"], COLUMN["wheel_y"]]][None], np.array([math.cos(angle), math.sin(angle)])
 
 
 def with_regions(

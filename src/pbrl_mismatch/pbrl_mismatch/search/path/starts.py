@@ -133,7 +133,7 @@ def drawn(
         draws = with_pins(rng, draws, (columns.index(effect.pins[0]), columns.index(effect.pins[1])), track)
     if effect.region is not None:
         x, y, length, width, angle = (columns.index(column) for column in effect.region)
-        tiles = tile_friction(track, ground.believed, GRAVITY * scene_of(track, base.row).mass)
+        tiles = tile_friction(track, ground.believed, GRAVITY * scene_of(track, base.row).mass, ground.row)
         draws = with_regions(rng, draws, (x, y, length, width, angle), *tiles)
     return draws, afresh
 
