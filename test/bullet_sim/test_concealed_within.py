@@ -200,6 +200,9 @@ def test_a_wheel_on_a_strut_feels_the_carpet(lab: Any) -> None:
     world, body, _ = made(lab, {"floor_patch": [tile], "wheel": {"table_a": wheel}})
     lab.run(world, 1.0, lambda: body.apply_force(np.array([14.0, 0, 0]), body.pose().point([0, 0, -0.2])))
     assert body.twist().linear[0] == pytest.approx((14.0 - 0.004 * 100 / 0.05) / 30.1, rel=0.03)
+    small = {**tile, "polygon": [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]}
+    _, _, effect = made(lab, {"floor_patch": [small], "wheel": {"table_a": wheel}})
+    assert effect.acting(), "where no foot is on it"
 
 
 def test_a_place_is_in_a_polygon_or_not() -> None:

@@ -112,6 +112,14 @@ def test_a_wheel_has_the_friction_that_was_found_whichever_way_it_is_described(t
         assert wheel.rolling_resistance * wheel.load / (wheel.radius * MASS * GRAVITY) == pytest.approx(0.01)
 
 
+def test_a_carpet_holds_a_wheel_back_by_what_was_found(tmp_path: Path) -> None:
+    numbers = {"wheel_x": -0.3, "wheel_y": 0.2, "wheel_theta": 0.4, "mu_x": 0.001, "mu_y": 0.2}
+    patch = {**NUMBERS["floor_patch"], "patch_roll": 0.03}
+    made = with_model(scene(), write(tmp_path, {"floor_patch": patch}, numbers)).concealed
+    wheel, tile = made.wheel["table"], made.floor_patch[0]
+    assert tile.rolling_resistance * wheel.load / wheel.radius == pytest.approx(0.03 * MASS * GRAVITY)
+
+
 def test_a_caster_that_holds_alike_in_every_direction_is_locked(tmp_path: Path) -> None:
     numbers = {"wheel_x": -0.3, "wheel_y": 0.2, "mu_x": 0.15}
     wheel = with_model(scene(), write(tmp_path, {}, numbers, mu_y=-1.0, cone=1.0)).concealed.wheel["table"]
