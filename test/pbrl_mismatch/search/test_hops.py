@@ -28,6 +28,7 @@ def ends(concealed_recording: Callable[..., Recording]) -> Any:
     track = track_of(concealed_recording("floor_patch", 1), "table")
     free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.02), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
     patch = free.with_effect(EFFECTS["floor_patch"], scene_of(track, free.rows(free.mean[None])[0]), 0)
+    patch = patch.fixed(("patch_roll",))  # there is no wheel that it could hold
     cuts, rng = cut_windows(track, 2.0), np.random.default_rng(0)
     objective = Objective(patch, cuts, OPTIONS.sensor_floor)
     beside = patch.mean + 0.3 * patch.spread * rng.standard_normal((2, len(patch.mean)))
