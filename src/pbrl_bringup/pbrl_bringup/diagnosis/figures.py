@@ -108,7 +108,7 @@ def over_time(found: ObjectDiagnosis) -> str:
     time = residual.time - residual.time[0]
     spread = 2.0 * np.sqrt(np.einsum("tii->ti", residual.covariance))
     # What is missing is told to within kilonewtons: an axis that shows those shows nothing else.
-    known = ~in_missing(residual.time, missing, BESIDE) if missing else np.ones(len(time), dtype=bool)
+    known = ~in_missing(residual.time, missing, BESIDE)
     names = ("force to the right [N]", "force away [N]", "turning moment [N m]")
     for k, (axes, name) in enumerate(zip(rows, names, strict=True)):
         axes.spines[["top", "right"]].set_visible(False)
