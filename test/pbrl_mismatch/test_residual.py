@@ -11,7 +11,9 @@ import pytest
 from pbrl_bag.types import Recording
 from pbrl_mismatch import MismatchError, residual_wrench, track_of
 from pbrl_mismatch.data.residual import MEMORIES, MEMORY, accelerations
+from pbrl_mismatch.data.track import origin_of
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
+from pbrl_mismatch.kernels.sense_kernel import as_seen, load_now
 
 MASS = 20.0
 
@@ -92,6 +94,16 @@ def test_body_axes_are_a_turn_of_world_axes(track: Any) -> None:
     found = residual_wrench(track, table_row(), size=1.0)
     np.testing.assert_allclose(np.hypot(*found.body[:, :2].T), np.hypot(*found.world[:, :2].T), atol=1e-12)
     np.testing.assert_allclose(np.linalg.det(found.body_covariance), np.linalg.det(found.covariance), rtol=1e-9)
+
+
+@pytest.mark.parametrize("moved", [{"com_x": 0.1, "com_y": -0.05}, {"tag_x": 0.04, "tag_y": 0.02, "tag_theta": 0.3}])
+def test_the_true_centre_is_where_tags_would_see_the_path(track: Any, moved: dict[str, float]) -> None:
+    row, com, pose = table_row(**moved), np.empty(2), np.empty(3)
+    found = residual_wrench(track, row, size=1.0)
+    load_now(row, 0.0, track.body, com)
+    for seen, true in zip(found.path[::50], found.state[::50], strict=True):
+        as_seen(row, true, com, pose)
+        np.testing.assert_allclose(pose, origin_of(seen[:3], track.body[1:3]), atol=1e-9)
 
 
 def test_the_same_recording_gives_the_same_bytes(track: Any) -> None:

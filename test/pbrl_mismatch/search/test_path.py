@@ -13,12 +13,11 @@ from pbrl_bag.types import Recording
 from pbrl_mismatch import EFFECTS, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.kernels.columns import COLUMN
-from pbrl_mismatch.kernels.sense_kernel import load_now, to_truth
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import scene_of
 from pbrl_mismatch.search.hypothesis import FURTHEST, BaselineOptions, baselines
 from pbrl_mismatch.search.objective import Objective
-from pbrl_mismatch.search.path.along import as_seen_path, lay_along
+from pbrl_mismatch.search.path.along import lay_along
 from pbrl_mismatch.search.path.climb import climb_along
 from pbrl_mismatch.search.path.ground import ground_of, traced, traced_score
 from pbrl_mismatch.search.path.screen import screen
@@ -75,19 +74,6 @@ def test_a_load_that_swings_slowly_is_left_behind_by_the_path(track: Any, free: 
         pull = -5.0 * (2.0 * np.pi * 0.02) ** 2 * moved
         found = swinging[start, :2] * (MASS - 5.0) - without[start, :2] * MASS
         np.testing.assert_allclose(found, pull, atol=0.15 * np.hypot(*pull))
-
-
-@pytest.mark.parametrize("moved", [{"com_x": 0.1, "com_y": -0.05}, {"tag_x": 0.04, "tag_y": 0.02, "tag_theta": 0.3}])
-def test_what_tags_see_of_a_true_path_is_its_way_back(track: Any, free: Any, moved: dict[str, float]) -> None:
-    row = free.rows(free.mean[None])[0]
-    for column, value in moved.items():
-        row[COLUMN[column]] = value
-    com, state, true = np.empty(2), np.zeros(20), np.empty_like(track.seen)
-    load_now(row, 0.0, track.body, com)
-    for k, seen in enumerate(track.seen):
-        to_truth(row, seen, track.body, com, state)
-        true[k] = state[:6]
-    np.testing.assert_allclose(as_seen_path(track, row, true), track.seen, atol=1e-12)
 
 
 def test_a_draw_near_the_truth_ranks_first_and_is_climbed_from(track: Any, free: Any, drag: Any) -> None:

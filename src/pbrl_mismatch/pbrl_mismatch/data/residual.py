@@ -1,7 +1,8 @@
 """The wrench that would reconcile a model with what was seen, over time, with its covariance.
 
 An unknown-input smoother: the body's state and a left-out wrench d are estimated together from recorded poses, never
-by second differences. d is an Ornstein-Uhlenbeck process of a size that makes the poses most likely.
+by second differences. d is an Ornstein-Uhlenbeck process of a size that makes the poses most likely. It is linearised
+about the recorded path as it was smoothed without any law, then about what came out of that, see `smoother_kernel`.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pbrl_mismatch.data.missing import in_missing
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.kernels.columns import WIDTH
-from pbrl_mismatch.kernels.smoother_kernel import SIZE, pushes_along, smooth_episode
+from pbrl_mismatch.kernels.smoother_kernel import SIZE, pushes_along, smooth_episode, true_centres
 from pbrl_model.sensing.windows import LEAST_NOISE, WIDENING
 
 Array = NDArray[np.float64]
@@ -29,6 +30,8 @@ SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 """Sizes of the left-out force that are tried [N]."""
 SMALL = 1
 """Which of them is tried first."""
+PASSES, SETTLED = 3, 0.5
+"""Times at most that it is smoothed, each time about what the last has found; a gain below this [nat] ends it."""
 UNKNOWN_FORCE = 1e3
 """Where the felt wrench is missing, nothing is known of what is left out beside it [N]."""
 
@@ -39,7 +42,8 @@ class ResidualWrench:
 
     Attributes:
         time: (T,) [s].
-        state: (T, 6) smoothed states of the model's centre of mass.
+        path: (T, 6) smoothed states of the nominal centre of mass as tags see it.
+        state: (T, 6) the same of the model's centre of mass.
         world: (T, 3) left-out wrench at the centre of mass in world axes [N, N, N m].
         covariance: (T, 3, 3) of `world`.
         size: of the left-out force before anything was seen [N].
@@ -48,6 +52,7 @@ class ResidualWrench:
     """
 
     time: Array
+    path: Array
     state: Array
     world: Array
     covariance: Array
@@ -103,14 +108,16 @@ def residual_wrench(
     if size is None:
         _, size, memory = max((_likeliest_size(track, row, each, stride) for each in tried), key=lambda found: found[0])
     elif memory is None:
-        memory = max(tried, key=lambda each: _smooth(track, row, size, each, stride, back=False)[2])
-    mean, spread, value = _smooth(track, row, size, memory, stride, back=True)
+        memory = max(tried, key=lambda each: _smooth(track, row, size, each, stride, _as_seen(track), back=False)[2])
+    mean, spread, value = _settled(track, row, size, memory, stride)
     # How far what is missing reaches is said by the data that are there and not by the memory, which may last a push.
     unknown = in_missing(track.clock, track.missing, min(memory, MEMORY))
     mean[unknown, 6:] = 0.0
     spread[unknown, 6:, 6:] += UNKNOWN_FORCE**2 * np.diag([1.0, 1.0, track.gyration**2])
+    path, state = np.ascontiguousarray(mean[:, :6]), np.empty((len(mean), 6))
+    true_centres(row, path, track.clock, track.body, state)
     return ResidualWrench(
-        track.clock, mean[:, :6], mean[:, 6:], spread[:, 6:, 6:], size, value, np.asarray(track.begin)
+        track.clock, path, state, mean[:, 6:], spread[:, 6:, 6:], size, value, np.asarray(track.begin)
     )
 
 
@@ -120,10 +127,11 @@ def _likeliest_size(track: Track, row: Array, memory: float, stride: int) -> tup
     It is climbed to from a small one: the likelihood has one top.
     """
     found: dict[int, float] = {}
+    as_seen = _as_seen(track)
 
     def likelihood(k: int) -> float:
         if k not in found:
-            found[k] = _smooth(track, row, SIZES[k], memory, stride, back=False)[2]
+            found[k] = _smooth(track, row, SIZES[k], memory, stride, as_seen, back=False)[2]
         return found[k]
 
     best = SMALL
@@ -133,9 +141,31 @@ def _likeliest_size(track: Track, row: Array, memory: float, stride: int) -> tup
     return likelihood(best), SIZES[best], memory
 
 
+def _as_seen(track: Track) -> Array:
+    """Return (T, SIZE) the path as it was smoothed without any law, and no wrench left out."""
+    return np.concatenate([track.seen, np.zeros((len(track.clock), SIZE - 6))], axis=1)
+
+
+def _settled(track: Track, row: Array, size: float, memory: float, stride: int) -> tuple[Array, Array, float]:
+    """Return what `_smooth` does about the likeliest of the paths that it goes through."""
+    best = _smooth(track, row, size, memory, stride, _as_seen(track), back=True)
+    last = best
+    for _ in range(PASSES - 1):
+        last = _smooth(track, row, size, memory, stride, last[0], back=True)
+        if last[2] > best[2]:
+            gained, best = last[2] - best[2], last
+            if gained < SETTLED:
+                break
+    return best
+
+
 def _smooth(
-    track: Track, row: Array, size: float, memory: float, stride: int, *, back: bool
+    track: Track, row: Array, size: float, memory: float, stride: int, about: Array, *, back: bool
 ) -> tuple[Array, Array, float]:
+    """Return means (T, SIZE) and covariances (T, SIZE, SIZE) of state and left-out wrench, and the likelihood [nat].
+
+    With `back` unset only the likelihood is one.
+    """
     count = len(track.clock)
     mean, spread = np.empty((count, SIZE)), np.empty((count, SIZE, SIZE))
     sizes = size * np.array([1.0, 1.0, track.gyration])
@@ -146,6 +176,7 @@ def _smooth(
         place = np.maximum((motion.pose_time - motion.time[0]) / motion.dt, 0.0)
         total += smooth_episode(
             row,
+            about[begin : last + 1],
             motion.state[0].copy(),
             WIDENING * motion.covariance[0] + 1e-10 * np.eye(6),
             sizes,

@@ -1,7 +1,10 @@
-"""Compiled: an unknown-input smoother, extended Kalman filter forward and Rauch-Tung-Striebel back.
+"""Compiled: an unknown-input smoother, Kalman filter forward and Rauch-Tung-Striebel back, about a path.
 
-The state is that of the body (6) with a wrench d (3) in world axes that the model does not have, an Ornstein-Uhlenbeck
-process (Matern 1/2). The body moves as the kernel has it, with d added; derivatives are finite differences of a step.
+The state is that of the nominal centre of mass as tags see it (6), with a wrench d (3) in world axes that the model
+does not have, an Ornstein-Uhlenbeck process (Matern 1/2). The body moves as `path_kernel.accelerate` has it, with d
+added, linearised about a path that is near already: one about its own predictions has a foot stick or slide by what it
+made of the poses before, is sure of that, and is lost where it was wrong. Smoothed anew about what came out, again and
+again, that is the Gauss-Newton method (an iterated extended Kalman smoother, Bell 1994).
 """
 
 from __future__ import annotations
@@ -15,7 +18,8 @@ from numpy.typing import NDArray
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels.laws_kernel import FOOT
 from pbrl_mismatch.kernels.motion_kernel import LAST, rehearse, step_seen
-from pbrl_mismatch.kernels.sense_kernel import as_seen, load_now, to_truth
+from pbrl_mismatch.kernels.path_kernel import REACTION, accelerate, half_a_reaction, remember_along
+from pbrl_mismatch.kernels.sense_kernel import load_now, to_truth
 from pbrl_mismatch.kernels.state import STATE
 from pbrl_mismatch.kernels.step_kernel import fixed_axes
 
@@ -23,8 +27,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 SIZE = 9
-STEPS = (1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 2e-3, 0.1, 0.1, 0.1)
-"""Finite differences in the state."""
+STEPS = (5e-4, 5e-4, 1e-3, 5e-3, 5e-3, 1e-2, 0.1, 0.1, 0.1)
+"""Finite differences in the state, of about what a path is uncertain by: dry friction is no line within less."""
 TINY = 1e-12
 """Variance that every step adds, so that no covariance becomes singular."""
 
@@ -50,18 +54,24 @@ def make_symmetric(spread: Array) -> None:
 
 
 @njit(**LEAF)
-def see(p: Array, mean: Array, com: Array, part: float, dt: float, state: Array, out: Array) -> None:
-    """Write the pose (3,) that tags would see a share `part` of a step after a state."""
-    for k in range(6):
-        state[k] = mean[k]
+def see(mean: Array, body: Array, after: float, out: Array, slope: Array) -> None:
+    """Write the pose (3,) that tags would see `after` so many seconds, and its slopes (3, SIZE) in the state."""
+    c, s = math.cos(mean[2] + after * mean[5]), math.sin(mean[2] + after * mean[5])
+    dx, dy = c * body[1] - s * body[2], s * body[1] + c * body[2]
+    slope[:] = 0.0
     for k in range(3):
-        state[k] += part * dt * mean[k + 3]
-    as_seen(p, state, com, out)
+        out[k] = mean[k] + after * mean[k + 3]
+        slope[k, k], slope[k, k + 3] = 1.0, after
+    out[0] -= dx
+    out[1] -= dy
+    slope[0, 2], slope[0, 5] = dy, after * dy
+    slope[1, 2], slope[1, 5] = -dx, -after * dx
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def smooth_episode(
     p: Array,
+    about: Array,
     told: Array,
     start: Array,
     sizes: Array,
@@ -86,6 +96,7 @@ def smooth_episode(
 
     Args:
         p: (WIDTH,) parameter row.
+        about: (T, SIZE) states, T the episode's steps, about which the model is linearised.
         told: (6,) start state of the nominal centre of mass as tags would see it.
         start: (6, 6) its covariance.
         sizes: (3,) standard deviation of d [N, N, N m].
@@ -102,60 +113,54 @@ def smooth_episode(
         place: (N,) in steps from the start, in order.
         pose: (N, 3) recorded; NaN where nothing was seen.
         variance: (3,) of a recorded pose.
-        mean: (T, 9) written, T the episode's steps; body states are the true centre of mass's.
-        spread: (T, 9, 9) written.
+        mean: (T, SIZE) written.
+        spread: (T, SIZE, SIZE) written.
         back: whether to smooth; otherwise only the likelihood is wanted and the rest is room.
     """
-    steps, dt, first = mean.shape[0], body[3], span[0]
-    state, trial, com, acc, wrench = np.zeros(STATE), np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3)
-    now, sight, other, extra = np.empty(SIZE), np.empty(3), np.empty(3), np.empty(3)
-    ahead_mean, ahead = np.empty((steps, SIZE)), np.empty((steps, SIZE, SIZE))
+    steps, dt, first, lag = mean.shape[0], body[3], span[0], half_a_reaction(body[3])
+    state, com, acc, wrench = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3)
+    pushed, moved, near, before, sight = np.empty(3), np.empty(3), np.empty(SIZE), np.empty(3), np.empty(3)
+    ahead_mean, ahead, slope = np.empty((steps, SIZE)), np.empty((steps, SIZE, SIZE)), np.empty((3, SIZE))
     moves = np.empty((steps, SIZE, SIZE))
     _, _ = load_now(p, clock[first], body, com)
-    to_truth(p, told, body, com, state)
     rehearse(p, seen, span, body, outline, feet, com, state)
     axes, room = np.empty(7), np.empty((feet.shape[0] + 1, FOOT))
-    fixed_axes(p, dt, axes)
+    fixed_axes(p, REACTION, axes)
     kept = math.exp(-dt / memory)
     x, c = np.zeros(SIZE), np.zeros((SIZE, SIZE))
-    x[:6] = state[:6]
+    x[:6] = told
     c[:6, :6] = start
     for k in range(3):
         c[6 + k, 6 + k] = sizes[k] ** 2
-    value, n, slope = 0.0, 0, np.empty(SIZE)
+    value, n = 0.0, 0
     for t in range(steps):
         while n < place.shape[0] and place[n] < t + 1:
             for k in range(3):
                 if math.isnan(pose[n, k]):
                     continue
-                see(p, x, com, place[n] - t, dt, trial, sight)
-                slope[:] = 0.0
-                for i in range(6):
-                    now[:] = x
-                    now[i] += STEPS[i]
-                    see(p, now, com, place[n] - t, dt, trial, other)
-                    slope[i] = (other[k] - sight[k]) / STEPS[i]
+                see(x, body, (place[n] - t) * dt, sight, slope)
                 residual = pose[n, k] - sight[k]
                 if k == 2:
                     residual -= 2.0 * math.pi * math.floor(residual / (2.0 * math.pi) + 0.5)
-                value += correct(x, c, slope, residual, variance[k])
+                value += correct(x, c, slope[k], residual, variance[k])
             n += 1
         mean[t] = x
         spread[t] = c
         move = moves[t]
         move[:] = 0.0
         for i in range(SIZE, -1, -1):
-            trial[:] = state
-            for k in range(6):
-                trial[k] = x[k]
-            extra[:] = x[6:]
-            if i > 0 and i <= 6:
-                trial[i - 1] += STEPS[i - 1]
-            elif i > 6:
-                extra[i - 7] += STEPS[i - 1]
-            step_seen(
+            near[:] = about[t]
+            before[:] = about[max(t - lag, 0), 3:6]
+            if i > 0:
+                near[i - 1] += STEPS[i - 1]
+                if 3 < i <= 6:
+                    before[i - 4] += STEPS[i - 1]
+            accelerate(
                 p,
-                trial,
+                near[:6],
+                before,
+                state,
+                near[6:],
                 first + t,
                 felt,
                 mount,
@@ -166,24 +171,28 @@ def smooth_episode(
                 body,
                 outline,
                 feet,
-                extra,
                 com,
                 axes,
                 acc,
                 room,
                 wrench,
+                moved,
             )
             if i > 0:
-                for k in range(6):
-                    move[k, i - 1] = trial[k]
-        state[:] = trial
+                move[3:6, i - 1] = moved
+        pushed[:] = moved
         for i in range(SIZE):
-            for k in range(6):
-                move[k, i] = (move[k, i] - trial[k]) / STEPS[i]
+            for k in range(3):
+                move[3 + k, i] = (move[3 + k, i] - pushed[k]) / STEPS[i] * dt
         for k in range(3):
-            move[6 + k, 6 + k] = kept
-        x[:6] = trial[:6]
-        x[6:] *= kept
+            move[k, k], move[k, 3 + k], move[6 + k, 6 + k] = 1.0, dt, kept
+            move[3 + k, 3 + k] += 1.0
+        remember_along(p, state, about, t, 1, com, outline, feet, dt)
+        x = move @ (x - about[t])
+        for k in range(3):
+            x[k] += about[t, k] + dt * about[t, 3 + k]
+            x[3 + k] += about[t, 3 + k] + dt * pushed[k]
+            x[6 + k] += kept * about[t, 6 + k]
         c = move @ c @ move.T
         make_symmetric(c)
         for k in range(6):
@@ -200,6 +209,15 @@ def smooth_episode(
         spread[t] += gain @ (spread[t + 1] - ahead[t]) @ gain.T
         make_symmetric(spread[t])
     return value
+
+
+@njit(cache=True, error_model="numpy")
+def true_centres(p: Array, path: Array, clock: Array, body: Array, out: Array) -> None:
+    """Write states of the true centre of mass (T, 6) for those of the nominal one as tags see it (T, 6), at `clock`."""
+    com = np.empty(2)
+    for t in range(path.shape[0]):
+        _, _ = load_now(p, clock[t], body, com)
+        to_truth(p, path[t], body, com, out[t])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

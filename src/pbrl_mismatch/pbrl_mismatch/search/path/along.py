@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.data.track import Track
-from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.kernels.path_kernel import accelerate_along
-from pbrl_mismatch.kernels.sense_kernel import load_now
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -83,31 +81,6 @@ class Along:
         moved = np.stack([self.operator[k] @ windows[:, :, k] for k in range(3)])
         out = self.still[..., None] - moved
         return np.ascontiguousarray(out.transpose(3, 1, 0, 2)).reshape(len(rows), len(self.counts), -1)
-
-
-def as_seen_path(track: Track, row: Array, state: Array) -> Array:
-    """Return the path of the nominal centre of mass as tags see it (T, 6), of a model's true states (T, 6)."""
-    com = np.empty(2)
-    out = state.copy()
-    out[:, 2] += row[COLUMN["tag_theta"]]
-    c, s = np.cos(state[:, 2]), np.sin(state[:, 2])
-    tc, ts = np.cos(out[:, 2]), np.sin(out[:, 2])
-    centres = np.empty((len(state), 2))
-    if row[COLUMN["payload_mass"]] == 0.0:
-        load_now(row, float(track.clock[0]), track.body, com)
-        centres[:] = com
-    else:
-        for k, time in enumerate(track.clock):
-            load_now(row, float(time), track.body, com)
-            centres[k] = com
-    bx, by = row[COLUMN["tag_x"]] - centres[:, 0], row[COLUMN["tag_y"]] - centres[:, 1]
-    dx = c * bx - s * by + tc * track.body[1] - ts * track.body[2]
-    dy = s * bx + c * by + ts * track.body[1] + tc * track.body[2]
-    out[:, 0] += dx
-    out[:, 1] += dy
-    out[:, 3] -= state[:, 5] * dy
-    out[:, 4] += state[:, 5] * dx
-    return out
 
 
 def lay_along(cuts: Cuts, path: Array, mass: float, floor: float, stride: int) -> Along:

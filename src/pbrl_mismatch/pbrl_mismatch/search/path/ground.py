@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +13,7 @@ from pbrl_mismatch.data.cuts import Cuts
 from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
 from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
-from pbrl_mismatch.search.path.along import Along, as_seen_path, lay_along
+from pbrl_mismatch.search.path.along import Along, lay_along
 from pbrl_mismatch.search.path.climb import climb_along, weights
 
 Array = NDArray[np.float64]
@@ -20,6 +21,9 @@ Array = NDArray[np.float64]
 COARSE, FINE = 8, 4
 """Steps between accelerations: for a first look, and for a climb or where more moves than the body."""
 ITERATIONS = 8
+ROUNDS, SAME_MASS, SETTLED = 3, 0.05, 1.0
+"""A path is smoothed so many times at most: anew where the mass found along it is another by more than this, as a
+logarithm, or the last time gained more than this [nat]."""
 
 
 @dataclass(frozen=True)
@@ -108,8 +112,7 @@ class Ground:
 
 def laid(cuts: Cuts, row: Array, lacks: ResidualWrench, floor: float, stride: int) -> Along:
     """Return windows along the path that a model (WIDTH,) and the wrench that it lacks explain together."""
-    path = as_seen_path(cuts.track, row, lacks.state)
-    return lay_along(cuts, path, float(row[COLUMN["mass"]]), floor, stride)
+    return lay_along(cuts, lacks.path, float(row[COLUMN["mass"]]), floor, stride)
 
 
 def ground_of(hypothesis: Hypothesis, coordinates: Array, cuts: Cuts, floor: float) -> Ground:
@@ -143,22 +146,45 @@ class Traced:
 
 
 def traced(hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float) -> Traced:
-    """Fit a hypothesis along its own path.
+    """Fit a hypothesis along its own path, which is smoothed anew with what was fitted along the last.
 
     Args:
         hypothesis: what is free.
-        starts: (n, K); the path is that of the first.
+        starts: (n, K); the first path is that of the first.
         cuts: windows.
         floor: size of a sensor's own error [N].
     """
+    found: Traced | None = None
+    size, off = None, math.inf
+    for _ in range(ROUNDS):
+        last, heavier = _traced_once(hypothesis, starts, cuts, floor, size)
+        gained = math.inf if found is None else last.evidence - found.evidence
+        # How far a steady error of the sensor reaches was laid down with another mass than was found.
+        if found is None or off > SAME_MASS or gained > 0.0:
+            found, off = last, abs(heavier)
+        if gained < SETTLED and off <= SAME_MASS:
+            break
+        starts, size = last.coordinates[None], last.size
+    assert found is not None
+    return found
+
+
+def _traced_once(
+    hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float, size: float | None
+) -> tuple[Traced, float]:
+    """Fit a hypothesis along the path of the first of its starts (n, K); return how much heavier it is found to be.
+
+    `size` of the left-out force [N] is sought where it is None; the second number is the logarithm of two masses.
+    """
     row = hypothesis.rows(starts[:1])[0]
-    lacks = residual_wrench(cuts.track, row)
+    lacks = residual_wrench(cuts.track, row, size=size)
     along = laid(cuts, row, lacks, floor, FINE)
     found = climb_along(along, hypothesis, starts, ITERATIONS)
     best = int(np.argmax(found.evidence))
-    scale = float(np.sqrt(max(1.0, found.misfit[best].sum() / along.counts.sum())))
+    u, scale = found.coordinates[best], float(np.sqrt(max(1.0, found.misfit[best].sum() / along.counts.sum())))
     evidence, density = float(found.evidence[best]), found.log_posterior(best)
-    return Traced(hypothesis, found.coordinates[best], evidence, density, scale, lacks.size, along)
+    heavier = math.log(float(hypothesis.rows(u[None])[0, COLUMN["mass"]]) / float(row[COLUMN["mass"]]))
+    return Traced(hypothesis, u, evidence, density, scale, lacks.size, along), heavier
 
 
 def traced_score(found: Traced, kept: Cuts, whole: Cuts, floor: float) -> float:
