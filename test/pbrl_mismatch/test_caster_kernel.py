@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
-from pbrl_mismatch.kernels.laws_kernel import FOOT, roll_on, swivel
+from pbrl_mismatch.kernels.friction_kernel import FOOT
+from pbrl_mismatch.kernels.laws_kernel import roll_on, swivel
 
 
 def test_a_caster_s_bearing_rubs_by_how_much_faster_than_the_body_its_fork_turns() -> None:

@@ -10,7 +10,7 @@ import pytest
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 from pbrl_mismatch.kernels.contact_kernel import contacts
 from pbrl_mismatch.kernels.crate_kernel import CRUSHING, ON_AN_EDGE, ON_CORNERS, ROUND, STIFFNESS, move_crate, pressed
-from pbrl_mismatch.kernels.laws_kernel import FOOT
+from pbrl_mismatch.kernels.friction_kernel import FOOT
 from pbrl_mismatch.kernels.state import STATE, UNSEEN
 from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body
 

@@ -9,7 +9,7 @@ import pytest
 
 from pbrl_mismatch.kernels.account_kernel import CREEP
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
-from pbrl_mismatch.kernels.laws_kernel import FOOT
+from pbrl_mismatch.kernels.friction_kernel import FOOT
 from pbrl_mismatch.kernels.state import STATE
 from pbrl_mismatch.kernels.step_kernel import fixed_axes, respond
 from pbrl_model.kernel import GRAVITY
@@ -25,7 +25,7 @@ def stepped(mu: float, wheel: tuple[float, float], twist: np.ndarray, wrench: np
     row = neutral_row()
     row[[COLUMN["slide_mu"], COLUMN["wheel2_mu_x"], COLUMN["wheel2_mu_y"]]] = mu, *wheel
     row[[COLUMN["wheel2_x"], COLUMN["wheel2_y"], COLUMN["wheel2_theta"]]] = *WHEEL, TURN
-    state, acc, axes, room = np.zeros(STATE), np.zeros(9), np.empty(7), np.empty((len(FEET) + 1, FOOT))
+    state, acc, axes, room = np.zeros(STATE), np.zeros(9), np.empty(7), np.empty((len(FEET) + 2, FOOT))
     state[3:6], acc[:3] = twist, wrench
     fixed_axes(row, dt, axes)
     respond(row, state, 1.0, 0.0, MASS, INERTIA, np.zeros(2), FEET, axes, acc, room, dt)

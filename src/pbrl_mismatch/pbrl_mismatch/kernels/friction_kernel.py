@@ -22,6 +22,12 @@ from pbrl_mismatch.kernels.account_kernel import CREEP, push, resist
 
 Array = NDArray[np.float64]
 
+ROLLS, SCRUBS, TWISTS, RUBS = 6, 8, 10, 12
+FOOT = 16
+"""Numbers of a foot: lever (x, y) [m], limit of its friction [N], load on it [N], cosine and sine of its caster's
+heading, as `laws_kernel.lay_feet` writes them; then what iterations keep of each friction. Two more rows are the second
+wheel's and the baseline's, of which `holding_kernel.lay_wheel` writes lever, both limits and heading."""
+
 
 @njit(**LEAF, forceinline=True)
 def bent(room: Array, i: int, k: int, a: float, b: float, rest: float, fresh: bool) -> tuple[float, ...]:

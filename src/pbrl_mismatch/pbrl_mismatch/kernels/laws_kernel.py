@@ -14,22 +14,16 @@ from numpy.typing import NDArray
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP, SETTLING, push, resist
-from pbrl_mismatch.kernels.friction_kernel import bent, rub_along, rub_in_ellipse
+from pbrl_mismatch.kernels.friction_kernel import ROLLS, RUBS, SCRUBS, TWISTS, bent, rub_along, rub_in_ellipse
+from pbrl_mismatch.kernels.holding_kernel import hold_wheel, patch_share
 from pbrl_mismatch.kernels.own_kernel import how_many, own_laws
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
 from pbrl_model.kernel import GRAVITY
 
 Array = NDArray[np.float64]
 
-BORDER = 0.01
-"""A patch's border is so soft [m]: a foot has a width, and a fit needs a slope."""
 BACKWARDS, TURNS_OVER = -1.0 + 1e-7, 4000.0
 """A caster whose turn has a cosine below this goes backwards, and still turns over: by so much of a tangent of half."""
-ROLLS, SCRUBS, TWISTS, RUBS = 6, 8, 10, 12
-FOOT = 16
-"""Numbers of a foot: lever (x, y) [m], limit of its friction [N], load on it [N], cosine and sine of its caster's
-heading, as `lay_feet` writes them; then what iterations keep of each friction, see `friction_kernel`. One more row is
-the second wheel's."""
 SWITCHING = 0.1
 """What begins at some moment comes on within this time [s]: a fit needs a slope."""
 
@@ -40,17 +34,6 @@ def between(time: float, start: float, end: float) -> float:
     if time < start - 0.5 * SWITCHING or time > end + 0.5 * SWITCHING:
         return 0.0
     return min((time - start) / SWITCHING + 0.5, (end - time) / SWITCHING + 0.5, 1.0)
-
-
-@njit(**LEAF)
-def patch_share(p: Array, c: float, s: float, x: float, y: float) -> float:
-    """Return how much a place on the floor belongs to a patch of which cosine and sine of the turn are told, 0..1."""
-    dx, dy = x - p[at.PATCH_X], y - p[at.PATCH_Y]
-    along = (p[at.PATCH_LENGTH] - abs(c * dx + s * dy)) / BORDER
-    across = (p[at.PATCH_WIDTH] - abs(-s * dx + c * dy)) / BORDER
-    if along < -30.0 or across < -30.0:
-        return 0.0
-    return 1.0 / ((1.0 + math.exp(-along)) * (1.0 + math.exp(-across)))
 
 
 @njit(**LEAF, forceinline=True)
@@ -240,7 +223,7 @@ def lay_feet(
         feet: (F, 2) points in the body's frame that share the load [m].
         axes: (7,) see `fixed_axes`.
         acc: (9,) account, of which the force tips the body.
-        room: (F + 1, FOOT) of which the first six numbers of the feet are written.
+        room: (F + 2, FOOT) of which the first six numbers of the feet are written.
     """
     count = feet.shape[0]
     even, ox, oy, gx, gy = mass * GRAVITY / count, 0.0, 0.0, 0.0, 0.0
@@ -271,10 +254,11 @@ def resistances(
     com: Array,
     axes: Array,
     room: Array,
+    wheel: bool,
     fresh: bool,
     acc: Array,
 ) -> None:
-    """Add dry friction at every foot and at the second wheel.
+    """Add dry friction at every foot, at the second wheel, and at the baseline's where `wheel` says so.
 
     Args:
         p: see `springs`, and so are those not named here.
@@ -286,7 +270,8 @@ def resistances(
         mass: see `springs`.
         com: see `springs`.
         axes: (7,) see `fixed_axes`.
-        room: (F + 1, FOOT), see `FOOT`.
+        room: (F + 2, FOOT), see `FOOT`.
+        wheel: whether `lay_wheel` was asked.
         fresh: see `friction_kernel.bent`.
         acc: (9,) account.
     """
@@ -294,7 +279,7 @@ def resistances(
         rolls, leaves = on_casters(p), p[at.BREAKAWAY_MU] > 0.0
         # Summed here and added once: nine sums in memory, foot after foot, took half as long again.
         fx, fy, torque, xx, xy, yy, xt, yt, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(room.shape[0] - 1):
+        for i in range(room.shape[0] - 2):
             rx, ry, limit, load = room[i, 0], room[i, 1], room[i, 2], room[i, 3]
             ux, uy = vx - omega * ry, vy + omega * rx
             if leaves:
@@ -324,4 +309,6 @@ def resistances(
         ax, ay, wc, ws = p[at.WHEEL2_X] - com[0], p[at.WHEEL2_Y] - com[1], axes[2], axes[3]
         rx, ry = c * ax - s * ay, s * ax + c * ay
         ex, ey, ux, uy = c * wc - s * ws, s * wc + c * ws, vx - omega * ry, vy + omega * rx
-        rub_in_ellipse(acc, room, room.shape[0] - 1, RUBS, rx, ry, ex, ey, along, across, ux, uy, fresh)
+        rub_in_ellipse(acc, room, room.shape[0] - 2, RUBS, rx, ry, ex, ey, along, across, ux, uy, fresh)
+    if wheel:
+        hold_wheel(p, vx, vy, omega, room, fresh, acc)

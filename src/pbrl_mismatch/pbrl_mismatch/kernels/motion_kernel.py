@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.crate_kernel import FOLLOWING, move_crate
-from pbrl_mismatch.kernels.laws_kernel import FOOT, on_casters
+from pbrl_mismatch.kernels.friction_kernel import FOOT
+from pbrl_mismatch.kernels.laws_kernel import on_casters
 from pbrl_mismatch.kernels.sense_kernel import acting, as_seen, load_now, to_truth
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH, STATE, UNSEEN
 from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body, swing_load, turn_casters
@@ -114,7 +115,7 @@ def simulate_window(
     """
     state, com, acc, wrench = np.empty(STATE), np.empty(2), np.empty(9), np.empty(3)
     before, after, axes = np.empty(3), np.empty(3), np.empty(7)
-    room = np.empty((feet.shape[0] + 1, FOOT))
+    room = np.empty((feet.shape[0] + 2, FOOT))
     first, steps, dt = span[FIRST], span[STEPS], body[3]
     knots = extra.shape[0] - 1
     mass, inertia = load_now(p, clock[first], body, com)

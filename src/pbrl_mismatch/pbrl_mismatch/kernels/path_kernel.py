@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels.contact_kernel import contacts
 from pbrl_mismatch.kernels.crate_kernel import FOLLOWING, LEANING
-from pbrl_mismatch.kernels.laws_kernel import FOOT, springs
+from pbrl_mismatch.kernels.friction_kernel import FOOT
+from pbrl_mismatch.kernels.laws_kernel import springs
 from pbrl_mismatch.kernels.motion_kernel import BEGIN, LAST, rehearse
 from pbrl_mismatch.kernels.sense_kernel import acting, load_now, to_truth
 from pbrl_mismatch.kernels.state import STATE
@@ -75,7 +76,7 @@ def accelerate(
         com: (2,) written, and so are those up to `out`.
         axes: (7,) read, see `fixed_axes`.
         acc: (9,).
-        room: (F + 1, FOOT).
+        room: (F + 2, FOOT).
         wrench: (3,).
         out: (3,) [m/s^2, m/s^2, rad/s^2].
     """
@@ -111,7 +112,7 @@ def accelerate(
 def remember_along(
     p: Array, state: Array, path: Array, t: int, stride: int, com: Array, outline: Array, feet: Array, dt: float
 ) -> None:
-    """Move what moves besides a body on a path (T, 6) from its step `t` by a stride; `state` as `accelerate` left it."""
+    """Move what moves besides a body on a path (T, 6), from step `t` by a stride; `state` is as `accelerate` left it."""
     after = min(t + stride, path.shape[0] - 1)
     passed = max(after - t, 1) * dt
     ax, ay = (path[after, 3] - path[t, 3]) / passed, (path[after, 4] - path[t, 4]) / passed
@@ -161,7 +162,7 @@ def accelerate_along(
         out: (P, ceil(T / stride), 3) [m/s^2, m/s^2, rad/s^2], written.
     """
     state, com, acc, wrench, extra = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3), np.zeros(3)
-    axes, room, lag = np.empty(7), np.empty((feet.shape[0] + 1, FOOT)), half_a_reaction(body[3])
+    axes, room, lag = np.empty(7), np.empty((feet.shape[0] + 2, FOOT)), half_a_reaction(body[3])
     for r in range(rows.shape[0]):
         p = rows[r]
         fixed_axes(p, REACTION, axes)

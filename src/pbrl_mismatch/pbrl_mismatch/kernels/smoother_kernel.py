@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_bag.kernel_options import LEAF
-from pbrl_mismatch.kernels.laws_kernel import FOOT
+from pbrl_mismatch.kernels.friction_kernel import FOOT
 from pbrl_mismatch.kernels.motion_kernel import LAST, rehearse, step_seen
 from pbrl_mismatch.kernels.path_kernel import REACTION, accelerate, half_a_reaction, remember_along
 from pbrl_mismatch.kernels.sense_kernel import load_now, to_truth
@@ -124,7 +124,7 @@ def smooth_episode(
     moves = np.empty((steps, SIZE, SIZE))
     _, _ = load_now(p, clock[first], body, com)
     rehearse(p, seen, span, body, outline, feet, com, state)
-    axes, room = np.empty(7), np.empty((feet.shape[0] + 1, FOOT))
+    axes, room = np.empty(7), np.empty((feet.shape[0] + 2, FOOT))
     fixed_axes(p, REACTION, axes)
     kept = math.exp(-dt / memory)
     x, c = np.zeros(SIZE), np.zeros((SIZE, SIZE))
@@ -254,7 +254,7 @@ def pushes_along(
         out: (P, ceil(T / stride), 3) change of velocity over a step, over dt [m/s^2, m/s^2, rad/s^2].
     """
     state, com, acc, wrench, extra = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3), np.zeros(3)
-    axes, room = np.empty(7), np.empty((feet.shape[0] + 1, FOOT))
+    axes, room = np.empty(7), np.empty((feet.shape[0] + 2, FOOT))
     for r in range(rows.shape[0]):
         p = rows[r]
         fixed_axes(p, body[3], axes)

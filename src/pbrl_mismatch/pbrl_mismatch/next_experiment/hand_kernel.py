@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.laws_kernel import FOOT
+from pbrl_mismatch.kernels.friction_kernel import FOOT
 from pbrl_mismatch.kernels.motion_kernel import rehearse
 from pbrl_mismatch.kernels.sense_kernel import as_seen, load_now, to_truth
 from pbrl_mismatch.kernels.state import SLOSH, STATE, UNSEEN
@@ -94,7 +94,7 @@ def push_once(
     """Simulate one push under one parameter row, see `push_all`; its arguments without their first axes."""
     state, com, acc, force = np.empty(STATE), np.empty(2), np.empty(9), np.empty(3)
     axes, pose, before, felt = np.empty(7), np.empty(3), np.empty(3), np.empty(3)
-    room = np.empty((feet.shape[0] + 1, FOOT))
+    room = np.empty((feet.shape[0] + 2, FOOT))
     dt, segments = body[3], out.shape[0]
     steps = max(segments, round(duration / dt))
     mass, inertia = load_now(p, began, body, com)
