@@ -20,11 +20,19 @@ WHEEL, TURN = np.array([0.2, 0.1]), 0.7
 STILL = np.array([0.0, 0.0, 0.0])
 
 
-def stepped(mu: float, wheel: tuple[float, float], twist: np.ndarray, wrench: np.ndarray, dt: float) -> np.ndarray:
+def stepped(
+    mu: float,
+    wheel: tuple[float, float],
+    twist: np.ndarray,
+    wrench: np.ndarray,
+    dt: float,
+    which: str = "wheel2",
+    cone: float = 1.0,
+) -> np.ndarray:
     """Return the twist (3,) after a step of the kernel; the body's axes are the world's."""
-    row = neutral_row()
-    row[[COLUMN["slide_mu"], COLUMN["wheel2_mu_x"], COLUMN["wheel2_mu_y"]]] = mu, *wheel
-    row[[COLUMN["wheel2_x"], COLUMN["wheel2_y"], COLUMN["wheel2_theta"]]] = *WHEEL, TURN
+    row, limits = neutral_row(), ("mu_x", "mu_y") if which == "wheel" else ("wheel2_mu_x", "wheel2_mu_y")
+    row[[COLUMN["slide_mu"], *(COLUMN[each] for each in limits), COLUMN["cone"]]] = mu, *wheel, cone
+    row[[COLUMN[f"{which}_x"], COLUMN[f"{which}_y"], COLUMN[f"{which}_theta"]]] = *WHEEL, TURN
     state, acc, axes, room = np.zeros(STATE), np.zeros(9), np.empty(7), np.empty((len(FEET) + 2, FOOT))
     state[3:6], acc[:3] = twist, wrench
     fixed_axes(row, dt, axes)
@@ -68,6 +76,30 @@ def crawled(mu: float, wheel: tuple[float, float], twist: np.ndarray, wrench: np
 def test_an_implicit_step_of_dry_friction_ends_where_a_crawl_ends(mu, wheel, twist, wrench, dt):
     case = mu, wheel, np.array(twist), np.array(wrench), dt
     np.testing.assert_allclose(stepped(*case), crawled(*case), atol=2e-3 * dt + 2e-5)
+
+
+@pytest.mark.parametrize("wheel", [(0.05, 0.6), (0.002, 0.6)])
+@pytest.mark.parametrize("cone", [0.0, 1.0])
+@pytest.mark.parametrize("mu", [0.0, 0.1])
+def test_a_wheel_that_rolls_under_a_push_across_answers_alike_in_long_steps_and_in_short_ones(wheel, cone, mu):
+    # One after the other, feet rub against where the wheel will not let them go: the longer the step, the more.
+    ahead = np.array([math.cos(TURN), math.sin(TURN), 0.0])
+    across = np.array([-ahead[1], ahead[0], 0.0])
+    wrench = 60.0 * across + [0.0, 0.0, 60.0 * float(WHEEL @ ahead[:2])]
+    twist = short = 0.2 * ahead
+    for _ in range(100):
+        short = stepped(mu, wheel, short, wrench, 5e-4, "wheel", cone)
+    long = stepped(mu, wheel, twist, wrench, 0.05, "wheel", cone)
+    np.testing.assert_allclose(long, short, atol=0.004)
+    assert abs(long @ across) < 0.01
+
+
+def test_the_baseline_s_wheel_beside_feet_is_the_second_one_with_its_parameters():
+    rng = np.random.default_rng(4)
+    for _ in range(30):
+        wheel = tuple(rng.uniform(0.0, 0.3, 2))
+        case = 0.05, wheel, rng.normal(size=3) * 0.1, rng.normal(size=3) * 40.0, 0.01
+        np.testing.assert_allclose(stepped(*case, "wheel"), stepped(*case), atol=1e-9)
 
 
 def test_a_body_at_rest_that_nothing_pushes_stays_at_rest():
