@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from concealed_cases import concealed, record
+from pushed_table import BEFORE, Truth, simulate
 
 from pbrl_bag.types import Recording
 from pbrl_mismatch import MismatchError, residual_wrench, track_of
@@ -72,6 +74,34 @@ def test_coverage_of_a_random_wrench_is_as_stated(track: Any) -> None:
         inside.append(np.abs(found.world - drawn) < 1.96 * spread)
     share = np.mean(np.concatenate(inside), axis=0)
     assert np.all((share > 0.90) & (share < 0.99)), share
+
+
+def test_feet_that_stick_are_followed_nearer_by_their_law_than_by_none() -> None:
+    # About its own predictions a filter is sure that a foot sticks, and lost where it let go a moment earlier.
+    off, seen = [], []
+    for seed in range(1, 8):
+        truth = Truth(
+            "breakaway_friction", concealed("breakaway_friction", np.random.default_rng([seed, 7])), wheel=None
+        )
+        pose, _, _ = simulate(truth, np.random.default_rng(seed))
+        track, n = track_of(record(truth, seed), "table"), truth.numbers
+        row = table_row(slide_mu=n["mu"], slide_extent=1.0, breakaway_mu=n["extra"], breakaway_speed=n["speed"])
+        found, none = residual_wrench(track, row), residual_wrench(track, table_row())
+        assert found.size <= 1.0 < none.size
+        assert found.log_likelihood > none.log_likelihood + 100.0
+        time = BEFORE + track.dt * np.arange(len(pose))
+        speed = np.stack([np.interp(track.clock, time, np.gradient(each, time)) for each in pose[:, :2].T], -1)
+        off.append(np.mean((found.path[:, 3:5] - speed) ** 2))
+        seen.append(np.mean((track.seen[:, 3:5] - speed) ** 2))
+    assert np.sqrt(np.mean(off)) < 0.75 * np.sqrt(np.mean(seen)), (off, seen)
+
+
+def test_what_is_known_of_a_model_like_it_is_where_it_begins(track: Any) -> None:
+    row = table_row(slide_mu=0.02, slide_extent=1.0)
+    once = residual_wrench(track, row)
+    again = residual_wrench(track, row, size=once.size, about=once)
+    assert again.log_likelihood > once.log_likelihood - 5.0
+    assert np.sqrt(np.mean((again.path - once.path) ** 2)) < 0.5 * np.sqrt(np.mean((track.seen - once.path) ** 2))
 
 
 @pytest.mark.parametrize("angle", [-10.0, 0.3])

@@ -2,7 +2,8 @@
 
 An unknown-input smoother: the body's state and a left-out wrench d are estimated together from recorded poses, never
 by second differences. d is an Ornstein-Uhlenbeck process of a size that makes the poses most likely. It is linearised
-about the recorded path as it was smoothed without any law, then about what came out of that, see `smoother_kernel`.
+about the recorded path as it was smoothed without any law, then half of the way to what came out, see
+`smoother_kernel`.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 """Sizes of the left-out force that are tried [N]."""
 SMALL = 1
 """Which of them is tried first."""
-PASSES, SETTLED = 3, 0.5
-"""Times at most that it is smoothed, each time about what the last has found; a gain below this [nat] ends it."""
+PASSES, SETTLED, PART = 4, 0.5, 0.5
+"""Times at most that it is smoothed, each time about a path that part of the way nearer to what the last has found; a
+gain below this [nat] ends it."""
 UNKNOWN_FORCE = 1e3
 """Where the felt wrench is missing, nothing is known of what is left out beside it [N]."""
 
@@ -85,7 +87,13 @@ class ResidualWrench:
 
 
 def residual_wrench(
-    track: Track, row: Array, *, size: float | None = None, memory: float | None = MEMORY, stride: int = 1
+    track: Track,
+    row: Array,
+    *,
+    size: float | None = None,
+    memory: float | None = MEMORY,
+    stride: int = 1,
+    about: ResidualWrench | None = None,
 ) -> ResidualWrench:
     """Estimate what a model leaves out.
 
@@ -95,6 +103,7 @@ def residual_wrench(
         size: of the left-out force [N]; None: the likeliest of `SIZES`.
         memory: time in which it forgets itself [s]; None: the likeliest of `MEMORIES`.
         stride: every so many poses are used.
+        about: what a model like it leaves out; None: nothing of that kind is known.
 
     Raises:
         MismatchError: the row does not fit, or a size is not above zero.
@@ -104,59 +113,71 @@ def residual_wrench(
     for what, value in (("size", 1.0 if size is None else size), ("memory", 1.0 if memory is None else memory)):
         if not (math.isfinite(value) and value > 0.0):
             raise MismatchError(f"residual: expected a {what} above zero, got {value}")
+    begun = np.zeros((len(track.clock), SIZE))
+    begun[:, :6] = track.seen if about is None else about.path
+    if about is not None:
+        begun[:, 6:] = about.world
     tried = MEMORIES if memory is None else (memory,)
-    if size is None:
-        _, size, memory = max((_likeliest_size(track, row, each, stride) for each in tried), key=lambda found: found[0])
-    elif memory is None:
-        memory = max(tried, key=lambda each: _smooth(track, row, size, each, stride, _as_seen(track), back=False)[2])
-    mean, spread, value = _settled(track, row, size, memory, stride)
+    found = max((_settled(track, row, size, each, stride, begun) for each in tried), key=lambda each: each.likelihood)
     # How far what is missing reaches is said by the data that are there and not by the memory, which may last a push.
-    unknown = in_missing(track.clock, track.missing, min(memory, MEMORY))
-    mean[unknown, 6:] = 0.0
-    spread[unknown, 6:, 6:] += UNKNOWN_FORCE**2 * np.diag([1.0, 1.0, track.gyration**2])
-    path, state = np.ascontiguousarray(mean[:, :6]), np.empty((len(mean), 6))
+    unknown = in_missing(track.clock, track.missing, min(found.memory, MEMORY))
+    found.mean[unknown, 6:] = 0.0
+    found.spread[unknown, 6:, 6:] += UNKNOWN_FORCE**2 * np.diag([1.0, 1.0, track.gyration**2])
+    path, state = np.ascontiguousarray(found.mean[:, :6]), np.empty((len(found.mean), 6))
     true_centres(row, path, track.clock, track.body, state)
-    return ResidualWrench(
-        track.clock, path, state, mean[:, 6:], spread[:, 6:, 6:], size, value, np.asarray(track.begin)
-    )
+    covariance, first = found.spread[:, 6:, 6:], np.asarray(track.begin)
+    return ResidualWrench(track.clock, path, state, found.mean[:, 6:], covariance, found.size, found.likelihood, first)
 
 
-def _likeliest_size(track: Track, row: Array, memory: float, stride: int) -> tuple[float, float, float]:
-    """Return the likelihood [nat] of the likeliest of `SIZES`, the size and the memory.
+@dataclass(frozen=True)
+class _Smoothed:
+    """What `_smooth` gives for one size and memory.
 
-    It is climbed to from a small one: the likelihood has one top.
+    Attributes:
+        mean: (T, SIZE) of state and left-out wrench.
+        spread: (T, SIZE, SIZE) their covariances.
+        size: of the left-out force [N].
+        memory: in which it forgets itself [s].
+        likelihood: of the poses [nat].
     """
+
+    mean: Array
+    spread: Array
+    size: float
+    memory: float
+    likelihood: float
+
+
+def _settled(track: Track, row: Array, size: float | None, memory: float, stride: int, about: Array) -> _Smoothed:
+    """Return the likeliest of what is smoothed about one path after the other, from `about` (T, SIZE) on."""
+    best, reached = None, SIZES[SMALL] if size is None else size
+    for _ in range(PASSES):
+        if size is None:
+            reached = _likeliest_size(track, row, memory, stride, about, SIZES.index(reached))
+        mean, spread, value = _smooth(track, row, reached, memory, stride, about, back=True)
+        gained = math.inf if best is None else value - best.likelihood
+        if best is None or gained > 0.0:
+            best = _Smoothed(mean, spread, reached, memory, value)
+        if abs(gained) < SETTLED:
+            break
+        about = about + PART * (mean - about)
+    assert best is not None
+    return best
+
+
+def _likeliest_size(track: Track, row: Array, memory: float, stride: int, about: Array, best: int) -> float:
+    """Return the likeliest of `SIZES` about a path (T, SIZE), climbed to from one: the likelihood has one top."""
     found: dict[int, float] = {}
-    as_seen = _as_seen(track)
 
     def likelihood(k: int) -> float:
         if k not in found:
-            found[k] = _smooth(track, row, SIZES[k], memory, stride, as_seen, back=False)[2]
+            found[k] = _smooth(track, row, SIZES[k], memory, stride, about, back=False)[2]
         return found[k]
 
-    best = SMALL
     for way in (-1, 1):
         while 0 <= best + way < len(SIZES) and likelihood(best + way) > likelihood(best):
             best += way
-    return likelihood(best), SIZES[best], memory
-
-
-def _as_seen(track: Track) -> Array:
-    """Return (T, SIZE) the path as it was smoothed without any law, and no wrench left out."""
-    return np.concatenate([track.seen, np.zeros((len(track.clock), SIZE - 6))], axis=1)
-
-
-def _settled(track: Track, row: Array, size: float, memory: float, stride: int) -> tuple[Array, Array, float]:
-    """Return what `_smooth` does about the likeliest of the paths that it goes through."""
-    best = _smooth(track, row, size, memory, stride, _as_seen(track), back=True)
-    last = best
-    for _ in range(PASSES - 1):
-        last = _smooth(track, row, size, memory, stride, last[0], back=True)
-        if last[2] > best[2]:
-            gained, best = last[2] - best[2], last
-            if gained < SETTLED:
-                break
-    return best
+    return SIZES[best]
 
 
 def _smooth(

@@ -112,7 +112,7 @@ def accelerate(
 def remember_along(
     p: Array, state: Array, path: Array, t: int, stride: int, com: Array, outline: Array, feet: Array, dt: float
 ) -> None:
-    """Move what moves besides a body on a path (T, 6), from step `t` by a stride; `state` is as `accelerate` left it."""
+    """Move what moves besides a body on a path (T, 6) from step `t` by a stride, `state` as `accelerate` left it."""
     after = min(t + stride, path.shape[0] - 1)
     passed = max(after - t, 1) * dt
     ax, ay = (path[after, 3] - path[t, 3]) / passed, (path[after, 4] - path[t, 4]) / passed

@@ -155,36 +155,30 @@ def traced(hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float) -> T
         floor: size of a sensor's own error [N].
     """
     found: Traced | None = None
-    size, off = None, math.inf
+    off, lacks = math.inf, None
     for _ in range(ROUNDS):
-        last, heavier = _traced_once(hypothesis, starts, cuts, floor, size)
+        row = hypothesis.rows(starts[:1])[0]
+        lacks = residual_wrench(cuts.track, row, size=None if lacks is None else lacks.size, about=lacks)
+        last = _traced_along(hypothesis, starts, laid(cuts, row, lacks, floor, FINE), lacks.size)
         gained = math.inf if found is None else last.evidence - found.evidence
         # How far a steady error of the sensor reaches was laid down with another mass than was found.
         if found is None or off > SAME_MASS or gained > 0.0:
-            found, off = last, abs(heavier)
+            mass = float(hypothesis.rows(last.coordinates[None])[0, COLUMN["mass"]])
+            found, off = last, abs(math.log(mass / float(row[COLUMN["mass"]])))
         if gained < SETTLED and off <= SAME_MASS:
             break
-        starts, size = last.coordinates[None], last.size
+        starts = last.coordinates[None]
     assert found is not None
     return found
 
 
-def _traced_once(
-    hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float, size: float | None
-) -> tuple[Traced, float]:
-    """Fit a hypothesis along the path of the first of its starts (n, K); return how much heavier it is found to be.
-
-    `size` of the left-out force [N] is sought where it is None; the second number is the logarithm of two masses.
-    """
-    row = hypothesis.rows(starts[:1])[0]
-    lacks = residual_wrench(cuts.track, row, size=size)
-    along = laid(cuts, row, lacks, floor, FINE)
+def _traced_along(hypothesis: Hypothesis, starts: Array, along: Along, size: float) -> Traced:
+    """Fit a hypothesis along a path, from starts (n, K); `size` is of the force that was left out about it [N]."""
     found = climb_along(along, hypothesis, starts, ITERATIONS)
     best = int(np.argmax(found.evidence))
-    u, scale = found.coordinates[best], float(np.sqrt(max(1.0, found.misfit[best].sum() / along.counts.sum())))
+    scale = float(np.sqrt(max(1.0, found.misfit[best].sum() / along.counts.sum())))
     evidence, density = float(found.evidence[best]), found.log_posterior(best)
-    heavier = math.log(float(hypothesis.rows(u[None])[0, COLUMN["mass"]]) / float(row[COLUMN["mass"]]))
-    return Traced(hypothesis, u, evidence, density, scale, lacks.size, along), heavier
+    return Traced(hypothesis, found.coordinates[best], evidence, density, scale, size, along)
 
 
 def traced_score(found: Traced, kept: Cuts, whole: Cuts, floor: float) -> float:
