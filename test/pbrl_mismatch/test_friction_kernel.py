@@ -36,7 +36,7 @@ def stepped(
     state, acc, axes, room = np.zeros(STATE), np.zeros(9), np.empty(7), np.empty((len(FEET) + 2, FOOT))
     state[3:6], acc[:3] = twist, wrench
     fixed_axes(row, dt, axes)
-    respond(row, state, 1.0, 0.0, MASS, INERTIA, np.zeros(2), FEET, axes, acc, room, dt)
+    respond(row, state, 1.0, 0.0, MASS, INERTIA, np.zeros(2), FEET, axes, state[3:6], acc, room, dt)
     return state[3:6]
 
 

@@ -208,10 +208,14 @@ def lay_feet(
     com: Array,
     feet: Array,
     axes: Array,
+    now: Array,
     acc: Array,
     room: Array,
 ) -> None:
-    """Write what every foot's friction takes from where the body is, not from how fast it goes, see `FOOT`.
+    """Write what every foot's friction takes from where the body is and how fast it goes now, see `FOOT`.
+
+    What breaks away is held by as much as at the speed of now: solved for, it would be stuck or loose, and which of
+    them would be chance.
 
     Args:
         p: see `springs`, and so are those not named here.
@@ -222,6 +226,7 @@ def lay_feet(
         com: see `springs`.
         feet: (F, 2) points in the body's frame that share the load [m].
         axes: (7,) see `fixed_axes`.
+        now: (3,) velocity of the centre of mass [m/s] and turning [rad/s].
         acc: (9,) account, of which the force tips the body.
         room: (F + 2, FOOT) of which the first six numbers of the feet are written.
     """
@@ -237,6 +242,9 @@ def lay_feet(
         mu = p[at.SLIDE_MU]
         if p[at.PATCH_MU] != 0.0:
             mu += p[at.PATCH_MU] * patch_share(p, axes[5], axes[6], state[0] + rx, state[1] + ry)
+        if p[at.BREAKAWAY_MU] > 0.0:
+            ux, uy = now[0] - now[2] * ry, now[1] + now[2] * rx
+            mu += p[at.BREAKAWAY_MU] * math.exp(-(ux * ux + uy * uy) / p[at.BREAKAWAY_SPEED] ** 2)
         room[i, 0], room[i, 1], room[i, 2], room[i, 3] = rx, ry, mu * load, load
         if rolls and i < CASTERS:
             room[i, 4], room[i, 5] = state[FIRST_CASTER + 2 * i], state[FIRST_CASTER + 2 * i + 1]
@@ -276,14 +284,12 @@ def resistances(
         acc: (9,) account.
     """
     if on_feet(p):
-        rolls, leaves = on_casters(p), p[at.BREAKAWAY_MU] > 0.0
+        rolls = on_casters(p)
         # Summed here and added once: nine sums in memory, foot after foot, took half as long again.
         fx, fy, torque, xx, xy, yy, xt, yt, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(room.shape[0] - 2):
-            rx, ry, limit, load = room[i, 0], room[i, 1], room[i, 2], room[i, 3]
+            rx, ry, limit = room[i, 0], room[i, 1], room[i, 2]
             ux, uy = vx - omega * ry, vy + omega * rx
-            if leaves:
-                limit += load * p[at.BREAKAWAY_MU] * math.exp(-(ux * ux + uy * uy) / p[at.BREAKAWAY_SPEED] ** 2)
             if limit > 0.0:
                 f, g, k, m, n = bent(room, i, RUBS, ux, uy, CREEP, fresh)
                 f, g, k, m, n = limit * f, limit * g, limit * k, limit * m, limit * n

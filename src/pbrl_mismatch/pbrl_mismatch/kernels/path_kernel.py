@@ -100,7 +100,8 @@ def accelerate(
     ux, uy, turning = before[0] + before[2] * ry, before[1] - before[2] * rx, before[2]
     state[3], state[4], state[5] = ux, uy, turning
     contacts(p, state, c, s, mass, inertia, com, pivot, outline, REACTION, LEANING, acc)
-    _, _, _ = respond(p, state, c, s, mass, inertia, com, feet, axes, acc, room, REACTION)
+    out[0], out[1], out[2] = vx, vy, omega
+    _, _, _ = respond(p, state, c, s, mass, inertia, com, feet, axes, out, acc, room, REACTION)
     turn = (state[5] - turning) / REACTION
     out[0] = (state[3] - ux) / REACTION - turn * ry - omega * omega * rx
     out[1] = (state[4] - uy) / REACTION + turn * rx - omega * omega * ry

@@ -103,6 +103,7 @@ def respond(
     com: Array,
     feet: Array,
     axes: Array,
+    now: Array,
     acc: Array,
     room: Array,
     dt: float,
@@ -122,6 +123,7 @@ def respond(
         com: see `step_body`.
         feet: see `step_body`.
         axes: see `step_body`.
+        now: see `laws_kernel.lay_feet`.
         acc: (9,) account, see `laws_kernel`.
         room: (F + 2, FOOT), see `laws_kernel.lay_feet`.
         dt: in which that happens [s].
@@ -134,7 +136,7 @@ def respond(
     coupled = wheel and (rubs or acc[3] + acc[5] + acc[8] > 0.0)
     if rubs or coupled:
         if on_feet(p):
-            lay_feet(p, state, c, s, mass, com, feet, axes, acc, room)
+            lay_feet(p, state, c, s, mass, com, feet, axes, now, acc, room)
         if coupled:
             lay_wheel(p, state, c, s, mass, com, axes, room)
         b0, b1, b2, b3, b4, b5, b6, b7, b8 = acc[0], acc[1], acc[2], acc[3], acc[4], acc[5], acc[6], acc[7], acc[8]
@@ -231,6 +233,6 @@ def step_body(
     acc[3:] = 0.0
     springs(p, state, c, s, time, mass, com, dt, acc)
     contacts(p, state, c, s, mass, inertia, com, pivot, outline, dt, CRUSHING, acc)
-    ax, ay, turned = respond(p, state, c, s, mass, inertia, com, feet, axes, acc, room, dt)
+    ax, ay, turned = respond(p, state, c, s, mass, inertia, com, feet, axes, state[3:6], acc, room, dt)
     remember(p, state, ax, ay, turned, c, s, com, outline, feet, dt, CRUSHING)
     return c, s
