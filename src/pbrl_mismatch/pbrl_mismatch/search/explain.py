@@ -25,7 +25,7 @@ from pbrl_mismatch.search.climbed_on import (
 from pbrl_mismatch.search.fitted import Fitted, Stages, judged, likeliest_first
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
 from pbrl_mismatch.search.hops import REACHED, hopped
-from pbrl_mismatch.search.library import search_library, trace
+from pbrl_mismatch.search.library import UNTOLD, search_library, trace
 from pbrl_mismatch.search.path.pins import may_be_pinned
 from pbrl_mismatch.search.predictive import predictive_test
 from pbrl_mismatch.search.weigh import Weighed, veto, weigh, worth_of_another
@@ -68,8 +68,8 @@ def explain(
 ) -> Explained:
     """Try single effects, then others on top of the likeliest for as long as something is still left out.
 
-    Long windows say most of a force, but where feet stick and let go nothing predicts them: where no effect reaches the
-    noise floor over the longest, the next shorter ones are asked. Several together, found there, may reach it over the
+    Long windows say most of a force, but where contacts come and go nothing predicts them: where no effect reaches the
+    noise floor over the longest, nor is told by its path, the next shorter ones are asked. Several together, found there, may reach it over the
     longest after all, and are then weighed there.
 
     Args:
@@ -91,7 +91,7 @@ def explain(
     singles = weigh(bases, tried, options)
     if _falls_short(tried) and len(stages.fitted) > 1:
         tried = polished(singles, tried, stages, options, hops=False)
-    if _falls_short(tried) and len(stages.fitted) > 1:
+    if _falls_short(tried) and not _runs_away(tried) and len(stages.fitted) > 1:
         given_up = Tried(stages, bases, tried)
         stages, bases = stages.without_longest(), [each.over_shorter() for each in bases]
         bases = likeliest_first(bases)
@@ -185,6 +185,12 @@ def _lacks(best: Fitted, grip: GripEvidence | None, options: DiagnoseOptions) ->
 def _falls_short(tried: list[Fitted]) -> bool:
     """Tell whether nothing that was tried predicts the windows it was fitted to."""
     return min(each.noise_scale for each in tried) > REACHED
+
+
+def _runs_away(tried: list[Fitted]) -> bool:
+    """Tell whether simulations run away from what is likeliest along its path, which shorter ones would as well."""
+    best = max(tried, key=lambda each: each.of_motion)
+    return best.traced is not None and best.traced.evidence > best.simulated + UNTOLD
 
 
 def held_against(explained: Explained, baseline: Fitted, options: DiagnoseOptions) -> tuple[Weighed, ...]:

@@ -142,21 +142,17 @@ class Fitted:
         It is what the likelihood pays for. A window in which a simulation runs away, as where a contact is met a moment
         early, counts for the one that it is; in the root mean square it would count for all.
         """
-        simulated = math.exp(self._paid / self.peak.objective.counts.sum())
-        return simulated if self.traced is None else min(simulated, self.traced.noise_scale)
+        paid = self._paid if self.traced is None else min(self._paid, self.traced.paid)
+        return math.exp(paid / float(self.peak.objective.counts.sum()))
 
     @property
     def unexplained(self) -> float:
         """Return how much likelier its poses would be, were what it leaves of them no more than noise [nat].
 
-        Noise alone scatters, and the scale of a simulated window follows it upwards: that much is not counted. A path
-        has one scale for all, which hardly scatters.
+        Noise alone scatters, and the scale of a window follows it upwards: that much is not counted.
         """
-        counts = self.peak.objective.counts
-        simulated = max(self._paid - sum(map(scattered, counts)), 0.0)
-        if self.traced is None:
-            return simulated
-        return min(simulated, float(counts.sum()) * math.log(self.traced.noise_scale))
+        paid = self._paid if self.traced is None else min(self._paid, self.traced.paid)
+        return max(paid - sum(map(scattered, self.peak.objective.counts)), 0.0)
 
     @property
     def _paid(self) -> float:

@@ -131,7 +131,8 @@ class Traced:
         coordinates: (K,).
         evidence: log evidence by Laplace [nat], on the scale of simulated windows.
         log_posterior: density at that point, on the same scale [nat].
-        noise_scale: scale of the noise that it needs, at least one.
+        noise_scale: scale of the noise that it needs over all windows, at least one.
+        paid: for the scales that its windows need [nat].
         size: of the left-out force [N].
         along: the windows.
     """
@@ -141,6 +142,7 @@ class Traced:
     evidence: float
     log_posterior: float
     noise_scale: float
+    paid: float
     size: float
     along: Along
 
@@ -178,7 +180,8 @@ def _traced_along(hypothesis: Hypothesis, starts: Array, along: Along, size: flo
     best = int(np.argmax(found.evidence))
     scale = float(np.sqrt(max(1.0, found.misfit[best].sum() / along.counts.sum())))
     evidence, density = float(found.evidence[best]), found.log_posterior(best)
-    return Traced(hypothesis, found.coordinates[best], evidence, density, scale, size, along)
+    paid = -0.5 * float(along.counts @ np.log(weights(along, found.misfit[best : best + 1])[0]))
+    return Traced(hypothesis, found.coordinates[best], evidence, density, scale, paid, size, along)
 
 
 def traced_score(found: Traced, kept: Cuts, whole: Cuts, floor: float) -> float:
