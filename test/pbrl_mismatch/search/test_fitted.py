@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +16,8 @@ from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.fitted import Fitted, alone, tops
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.objective import Objective, scattered
+from pbrl_mismatch.search.path.climb import climb_along, likelihood
+from pbrl_mismatch.search.path.ground import traced
 
 
 def test_what_is_unexplained_is_what_its_likelihood_lacks_to_that_of_noise(
@@ -33,10 +33,11 @@ def test_what_is_unexplained_is_what_its_likelihood_lacks_to_that_of_noise(
     by_chance = sum(scattered(count) for count in objective.counts)
     assert level.unexplained == pytest.approx(float(lacks[0]) - by_chance, rel=1e-9)
     assert level.unexplained > 100.0
-    # A path has one scale for all, of which nothing is taken off.
-    path: Any = SimpleNamespace(noise_scale=1.01)
-    along = replace(level, traced=path)
-    assert along.unexplained == pytest.approx(objective.counts.sum() * math.log(1.01))
+    # So it is along a path, where windows have scales of their own as well.
+    found = traced(free, free.mean[None], objective.cuts, 0.15)
+    misfit = climb_along(found.along, free, found.coordinates[None], 0).misfit
+    along = likelihood(found.along, np.minimum(misfit, found.along.counts)) - likelihood(found.along, misfit)
+    assert replace(level, traced=found).unexplained == pytest.approx(min(along[0], lacks[0]) - by_chance, rel=1e-9)
 
 
 @pytest.mark.parametrize("count", [12.0, 60.0, 123.0])

@@ -31,9 +31,10 @@ SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 """Sizes of the left-out force that are tried [N]."""
 SMALL = 1
 """Which of them is tried first."""
-PASSES, SETTLED, PART = 4, 0.5, 0.5
-"""Times at most that it is smoothed, each time about a path that part of the way nearer to what the last has found; a
-gain below this [nat] ends it."""
+PASSES, AGAIN, SIZED = 4, 2, 2
+"""Times at most that it is smoothed, and where a path of a model like it is told; in the first a size is sought."""
+SETTLED, PART = 0.5, 0.5
+"""A gain below this [nat] ends it; each time the path that it is about is nearer to what was found by that part."""
 UNKNOWN_FORCE = 1e3
 """Where the felt wrench is missing, nothing is known of what is left out beside it [N]."""
 
@@ -118,7 +119,9 @@ def residual_wrench(
     if about is not None:
         begun[:, 6:] = about.world
     tried = MEMORIES if memory is None else (memory,)
-    found = max((_settled(track, row, size, each, stride, begun) for each in tried), key=lambda each: each.likelihood)
+    passes = PASSES if about is None else AGAIN
+    smoothed = [_settled(track, row, size, each, stride, begun, passes) for each in tried]
+    found = max(smoothed, key=lambda each: each.likelihood)
     # How far what is missing reaches is said by the data that are there and not by the memory, which may last a push.
     unknown = in_missing(track.clock, track.missing, min(found.memory, MEMORY))
     found.mean[unknown, 6:] = 0.0
@@ -148,11 +151,13 @@ class _Smoothed:
     likelihood: float
 
 
-def _settled(track: Track, row: Array, size: float | None, memory: float, stride: int, about: Array) -> _Smoothed:
+def _settled(
+    track: Track, row: Array, size: float | None, memory: float, stride: int, about: Array, passes: int
+) -> _Smoothed:
     """Return the likeliest of what is smoothed about one path after the other, from `about` (T, SIZE) on."""
     best, reached = None, SIZES[SMALL] if size is None else size
-    for _ in range(PASSES):
-        if size is None:
+    for number in range(passes):
+        if size is None and number < SIZED:
             reached = _likeliest_size(track, row, memory, stride, about, SIZES.index(reached))
         mean, spread, value = _smooth(track, row, reached, memory, stride, about, back=True)
         gained = math.inf if best is None else value - best.likelihood

@@ -54,6 +54,60 @@ def make_symmetric(spread: Array) -> None:
 
 
 @njit(**LEAF)
+def moved_on(move: Array, dt: float, kept: float, spread: Array, out: Array) -> None:
+    """Write M P of a step's matrix M, of which only the rows of the velocities are not plain, and P (SIZE, SIZE)."""
+    for j in range(SIZE):
+        for k in range(3):
+            out[k, j] = spread[k, j] + dt * spread[3 + k, j]
+            out[6 + k, j] = kept * spread[6 + k, j]
+            total = 0.0
+            for i in range(SIZE):
+                total += move[3 + k, i] * spread[i, j]
+            out[3 + k, j] = total
+
+
+@njit(**LEAF)
+def solve_symmetric(matrix: Array, other: Array) -> None:
+    """Put A^-1 B in the place of B (SIZE, SIZE), and A's Cholesky factor in that of A."""
+    for j in range(SIZE):
+        for i in range(j, SIZE):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = math.sqrt(total) if i == j else total / matrix[j, j]
+    for column in range(SIZE):
+        for i in range(SIZE):
+            total = other[i, column]
+            for k in range(i):
+                total -= matrix[i, k] * other[k, column]
+            other[i, column] = total / matrix[i, i]
+        for i in range(SIZE - 1, -1, -1):
+            total = other[i, column]
+            for k in range(i + 1, SIZE):
+                total -= matrix[k, i] * other[k, column]
+            other[i, column] = total / matrix[i, i]
+
+
+@njit(**LEAF)
+def turned(gain: Array, spread: Array, room: Array, out: Array) -> None:
+    """Add G^T P G to a covariance, all of them (SIZE, SIZE)."""
+    for i in range(SIZE):
+        for j in range(SIZE):
+            total = 0.0
+            for k in range(SIZE):
+                total += spread[i, k] * gain[k, j]
+            room[i, j] = total
+    for i in range(SIZE):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(SIZE):
+                total += gain[k, i] * room[k, j]
+            out[i, j] += total
+            if i != j:
+                out[j, i] += total
+
+
+@njit(**LEAF)
 def see(mean: Array, body: Array, after: float, out: Array, slope: Array) -> None:
     """Write the pose (3,) that tags would see `after` so many seconds, and its slopes (3, SIZE) in the state."""
     c, s = math.cos(mean[2] + after * mean[5]), math.sin(mean[2] + after * mean[5])
@@ -121,7 +175,7 @@ def smooth_episode(
     state, com, acc, wrench = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3)
     pushed, moved, near, before, sight = np.empty(3), np.empty(3), np.empty(SIZE), np.empty(3), np.empty(3)
     ahead_mean, ahead, slope = np.empty((steps, SIZE)), np.empty((steps, SIZE, SIZE)), np.empty((3, SIZE))
-    moves = np.empty((steps, SIZE, SIZE))
+    moves, half, gain = np.empty((steps, SIZE, SIZE)), np.empty((SIZE, SIZE)), np.empty((SIZE, SIZE))
     _, _ = load_now(p, clock[first], body, com)
     rehearse(p, seen, span, body, outline, feet, com, state)
     axes, room = np.empty(7), np.empty((feet.shape[0] + 2, FOOT))
@@ -185,15 +239,17 @@ def smooth_episode(
             for k in range(3):
                 move[3 + k, i] = (move[3 + k, i] - pushed[k]) / STEPS[i] * dt
         for k in range(3):
-            move[k, k], move[k, 3 + k], move[6 + k, 6 + k] = 1.0, dt, kept
             move[3 + k, 3 + k] += 1.0
         remember_along(p, state, about, t, 1, com, outline, feet, dt)
-        x = move @ (x - about[t])
+        x -= about[t]
         for k in range(3):
-            x[k] += about[t, k] + dt * about[t, 3 + k]
-            x[3 + k] += about[t, 3 + k] + dt * pushed[k]
-            x[6 + k] += kept * about[t, 6 + k]
-        c = move @ c @ move.T
+            pushed[k] = dt * pushed[k] + np.dot(move[3 + k], x)
+        for k in range(3):
+            x[k] += dt * x[3 + k] + about[t, k] + dt * about[t, 3 + k]
+            x[3 + k] = about[t, 3 + k] + pushed[k]
+            x[6 + k] = kept * (x[6 + k] + about[t, 6 + k])
+        moved_on(move, dt, kept, c, half)
+        moved_on(move, dt, kept, half.T, c)
         make_symmetric(c)
         for k in range(6):
             c[k, k] += TINY
@@ -204,10 +260,13 @@ def smooth_episode(
     if not back:
         return value
     for t in range(steps - 2, -1, -1):
-        gain = np.linalg.solve(ahead[t], moves[t] @ spread[t]).T
-        mean[t] += gain @ (mean[t + 1] - ahead_mean[t])
-        spread[t] += gain @ (spread[t + 1] - ahead[t]) @ gain.T
-        make_symmetric(spread[t])
+        moved_on(moves[t], dt, kept, spread[t], half)
+        for i in range(SIZE):
+            for k in range(SIZE):
+                c[i, k] = spread[t + 1, i, k] - ahead[t, i, k]
+        solve_symmetric(ahead[t], half)
+        mean[t] += half.T @ (mean[t + 1] - ahead_mean[t])
+        turned(half, c, gain, spread[t])
     return value
 
 

@@ -69,8 +69,8 @@ def explain(
     """Try single effects, then others on top of the likeliest for as long as something is still left out.
 
     Long windows say most of a force, but where contacts come and go nothing predicts them: where no effect reaches the
-    noise floor over the longest, nor is told by its path, the next shorter ones are asked. Several together, found there, may reach it over the
-    longest after all, and are then weighed there.
+    noise floor over the longest, nor is told by its path, the next shorter ones are asked. Several together, found
+    there, may reach it over the longest after all, and are then weighed there.
 
     Args:
         seed: of every draw.
