@@ -18,7 +18,8 @@ from pbrl_mismatch.data.missing import in_missing
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.kernels.columns import WIDTH
-from pbrl_mismatch.kernels.smoother_kernel import SIZE, pushes_along, smooth_episode, true_centres
+from pbrl_mismatch.kernels.path_kernel import pushes_along
+from pbrl_mismatch.kernels.smoother_kernel import SIZE, smooth_episode, true_centres
 from pbrl_model.sensing.windows import LEAST_NOISE, WIDENING
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels.friction_kernel import FOOT
-from pbrl_mismatch.kernels.motion_kernel import LAST, rehearse, step_seen
+from pbrl_mismatch.kernels.motion_kernel import rehearse
 from pbrl_mismatch.kernels.path_kernel import REACTION, accelerate, half_a_reaction, remember_along
 from pbrl_mismatch.kernels.sense_kernel import load_now, to_truth
 from pbrl_mismatch.kernels.state import STATE
@@ -277,74 +277,3 @@ def true_centres(p: Array, path: Array, clock: Array, body: Array, out: Array) -
     for t in range(path.shape[0]):
         _, _ = load_now(p, clock[t], body, com)
         to_truth(p, path[t], body, com, out[t])
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def pushes_along(
-    rows: Array,
-    path: Array,
-    felt: Array,
-    mount: Array,
-    seen: Array,
-    clock: Array,
-    span: Index,
-    pivot: Array,
-    body: Array,
-    outline: Array,
-    feet: Array,
-    stride: int,
-    out: Array,
-) -> None:
-    """Write what acts on the body in each row's model along one given path, mass times acceleration.
-
-    Args:
-        rows: (P, WIDTH).
-        path: (T, 6) states of the nominal centre of mass in one episode, as tags would see it.
-        felt: see `simulate_serial`, and so are those up to `feet`.
-        mount: see `simulate_serial`.
-        seen: see `simulate_serial`.
-        clock: see `simulate_serial`.
-        span: (4,).
-        pivot: (3,).
-        body: (4,).
-        outline: (E, 2).
-        feet: (F, 2).
-        stride: every so many steps; 1 for models in which more moves than the body.
-        out: (P, ceil(T / stride), 3) change of velocity over a step, over dt [m/s^2, m/s^2, rad/s^2].
-    """
-    state, com, acc, wrench, extra = np.zeros(STATE), np.empty(2), np.empty(9), np.empty(3), np.zeros(3)
-    axes, room = np.empty(7), np.empty((feet.shape[0] + 2, FOOT))
-    for r in range(rows.shape[0]):
-        p = rows[r]
-        fixed_axes(p, body[3], axes)
-        _, _ = load_now(p, clock[span[0]], body, com)
-        rehearse(p, seen, span, body, outline, feet, com, state)
-        for n in range(out.shape[1]):
-            t = n * stride
-            step = min(span[0] + t, span[LAST])
-            _, _ = load_now(p, clock[step], body, com)
-            to_truth(p, path[t], body, com, state)
-            vx, vy, omega = state[3], state[4], state[5]
-            step_seen(
-                p,
-                state,
-                step,
-                felt,
-                mount,
-                seen,
-                clock,
-                span,
-                pivot,
-                body,
-                outline,
-                feet,
-                extra,
-                com,
-                axes,
-                acc,
-                room,
-                wrench,
-            )
-            out[r, n, 0] = (state[3] - vx) / body[3]
-            out[r, n, 1] = (state[4] - vy) / body[3]
-            out[r, n, 2] = (state[5] - omega) / body[3]
