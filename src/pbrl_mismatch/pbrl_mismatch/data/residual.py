@@ -33,7 +33,7 @@ SIZES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 SMALL = 1
 """Which of them is tried first."""
 PASSES, AGAIN, SIZED = 4, 2, 2
-"""Times at most that it is smoothed, and where a path of a model like it is told; in the first a size is sought."""
+"""Times that it is smoothed at most; where a path of a model like it is told; of the first, those that seek a size."""
 SETTLED, PART = 0.5, 0.5
 """A gain below this [nat] ends it; each time the path that it is about is nearer to what was found by that part."""
 UNKNOWN_FORCE = 1e3

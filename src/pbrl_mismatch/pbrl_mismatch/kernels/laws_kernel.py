@@ -166,7 +166,7 @@ def roll_on(p: Array, room: Array, i: int, ux: float, uy: float, omega: float, f
 
 @njit(**LEAF, forceinline=True)
 def dry(p: Array) -> bool:
-    """Tell whether any dry friction of the effects is on: its limit depends on the velocity it leads to."""
+    """Tell whether any dry friction of the effects is on: its direction is that of the velocity it leads to."""
     floor = p[at.SLIDE_MU] + p[at.BREAKAWAY_MU] + abs(p[at.PATCH_MU])
     return on_casters(p) or floor + p[at.WHEEL2_MU_X] + max(p[at.WHEEL2_MU_Y], 0.0) > 0.0
 
