@@ -15,14 +15,18 @@ from pbrl_bag.types import Recording
 from pbrl_mismatch import EFFECTS, DiagnoseOptions, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.search.fitted import cut_stages, fit_baseline, scene_of
-from pbrl_mismatch.search.held import KEPT, held_starts, holds
+from pbrl_mismatch.search.held import KEPT_OF_PLACES, held_starts, holds
 from pbrl_mismatch.search.hypothesis import OF_FRICTION, BaselineOptions, baselines
 from pbrl_mismatch.search.path.ground import ground_of
 
 OPTIONS = DiagnoseOptions()
+DRAWN = {"hidden_obstacle": 6}
+"""A place that is missed by a centimetre must not be a matter of luck: it is found from so many seeds."""
 
 
-@pytest.mark.parametrize(("name", "seed", "within"), [("hidden_obstacle", 4, 0.1), ("floor_patch", 8, 0.35)])
+@pytest.mark.parametrize(
+    ("name", "seed", "within"), [("hidden_obstacle", 4, 0.1), ("hidden_obstacle", 12, 0.1), ("floor_patch", 8, 0.35)]
+)
 @pytest.mark.parametrize("heavier", [1.0, 8.0])
 def test_the_place_is_found_whatever_the_body_was_taken_for(
     concealed_recording: Callable[..., Recording], name: str, seed: int, within: float, heavier: float
@@ -39,18 +43,19 @@ def test_the_place_is_found_whatever_the_body_was_taken_for(
     ground = ground_of(wheel, base.peak.coordinates[0], cut_windows(track, 2.0), OPTIONS.sensor_floor)
     laid = wheel.with_effect(EFFECTS[name], scene_of(track, base.row), 0)
 
-    def begin() -> np.ndarray:
-        return held_starts(np.random.default_rng(1), laid, 0, base, ground, stages.fitted[0], OPTIONS)
+    def begin(seed: int) -> np.ndarray:
+        return held_starts(np.random.default_rng(seed), laid, 0, base, ground, stages.fitted[0], OPTIONS)
 
-    starts = begin()
-    np.testing.assert_array_equal(starts, begin())
+    starts = begin(1)
+    np.testing.assert_array_equal(starts, begin(1))
     np.testing.assert_array_equal(starts, laid.believable(starts))
-    assert 1 <= len(starts) <= KEPT
+    assert 1 <= len(starts) <= KEPT_OF_PLACES
     x, y, turn = track.seen[0, :3]
     c, s = math.cos(turn), math.sin(turn)
     there = np.array([x + c * truth["x"] - s * truth["y"], y + s * truth["x"] + c * truth["y"]])
-    place = starts[:, [laid.columns.index(column) for column in EFFECTS[name].place or ()]]
-    assert np.hypot(*(place - there).T).min() < within
+    place = [laid.columns.index(column) for column in EFFECTS[name].place or ()]
+    for seed in range(1, 1 + DRAWN.get(name, 1)):
+        assert np.hypot(*(begin(seed)[:, place] - there).T).min() < within
 
 
 def test_friction_and_contacts_hold_and_nothing_else() -> None:

@@ -127,6 +127,12 @@ def drawn(
             draws[:, k] = np.where(afresh & (column not in kept), before, ground.coordinates[own])
     for half, lacks in ((~afresh, ground.lacks), (afresh, ground.believed)):
         draws[half] = _placed(rng, draws[half], columns, effect, track, lacks)
+    if effect.touches is not None:
+        x, y, radius = (columns.index(column) for column in effect.touches)
+        # What a body is taken for may hide a touch, or make one: where it is, both wrenches say.
+        both = [contact_points(track, each, met=effect.remembers) for each in (ground.lacks, ground.believed)]
+        places, normals = (np.concatenate(each) for each in zip(*both, strict=True))
+        draws = with_contacts(rng, draws, (x, y, radius), places, normals)
     if effect.second and "wheel_x" in columns:
         draws = with_splits(rng, draws, columns, scene_of(track, base.row).size)
     if effect.pins is not None:
@@ -157,9 +163,6 @@ def _placed(
     lacks: ResidualWrench,
 ) -> Array:
     """Return draws (n, K) of which some are put where and when a lacking wrench says that an effect acts."""
-    if effect.touches is not None:
-        x, y, radius = (columns.index(column) for column in effect.touches)
-        draws = with_contacts(rng, draws, (x, y, radius), *contact_points(track, lacks, met=effect.remembers))
     if effect.pulls:
         x, y, *at = (columns.index(name) for name in effect.pulls if name in columns)
         point = (at[0], at[1]) if at else None
