@@ -42,11 +42,30 @@ def test_a_steady_force_is_as_large_as_it_is_and_acts_always(track: Any) -> None
     assert inside(track, activity(track, row, ["external_force"])["external_force"] or ()).all()
 
 
-def test_a_load_acts_from_its_moment_on_and_never_before(track: Any) -> None:
+@pytest.mark.parametrize("gone", [0.0, 1.0])
+def test_a_load_acts_from_its_moment_on_or_until_then(track: Any, gone: float) -> None:
     moment = float(track.clock[len(track.clock) // 2])
-    found = activity(track, table_row(payload_mass=15.0, payload_time=moment), ["payload_change"])["payload_change"]
-    assert found and found[0][0] >= moment - 0.06  # a load comes on over some steps, so that its moment has a slope
-    assert found[-1][1] > moment + 1.0
+    row = table_row(payload_mass=15.0, payload_time=moment, payload_gone=gone)
+    found = inside(track, activity(track, row, ["payload_change"])["payload_change"] or ())
+    # Also where the body is at rest, or goes at a steady speed, and the load is not felt.
+    np.testing.assert_array_equal(found, (track.clock >= moment) != (gone > 0.0))
+
+
+def test_a_load_that_is_not_felt_does_not_act(track: Any) -> None:
+    row = table_row(payload_mass=1e-4, payload_time=float(track.clock[0]))
+    assert activity(track, row, ["payload_change"])["payload_change"] == ()
+
+
+@pytest.mark.parametrize("cone", [0.0, 1.0])
+def test_beside_a_wheel_a_patch_acts_only_where_a_foot_is_on_it(track: Any, cone: float) -> None:
+    wheel = table_row(mu_x=0.05, mu_y=0.2, cone=cone, wheel_x=0.1)
+    patch = {"patch_mu": 0.3, "patch_length": 0.2, "patch_width": 0.2}
+    for name, value in patch.items():
+        wheel[COLUMN[name]] = value
+    wheel[COLUMN["patch_x"]] = float(track.seen[:, 0].max()) + 5.0  # metres from where the body ever was
+    assert activity(track, wheel, ["floor_patch"])["floor_patch"] == ()
+    wheel[[COLUMN["patch_x"], COLUMN["patch_y"]]] = track.seen[0, :2] + np.array(track.feet[0])
+    assert activity(track, wheel, ["floor_patch"])["floor_patch"]
 
 
 def test_a_cord_acts_where_it_is_taut(track: Any) -> None:

@@ -3,7 +3,7 @@
 A tether pulls only while it is taut, a patch rubs only while a foot is on it, a post pushes only while it is touched;
 none of them has a parameter that says when. So the fitted law is asked: along the recorded motion, the body's
 acceleration is taken twice, with the effect's columns as they were fitted and with them off. Times the mass, the
-difference is what the effect did at that moment.
+difference is what the effect did at that moment. A load that was put on says itself from when on it is there.
 """
 
 from __future__ import annotations
@@ -39,6 +39,9 @@ and a stiff contact on and off with them."""
 FURTHEST = 0.02
 """Where the whole path keeps off what it must have touched, it is taken to be off by as little as makes it touch, and
 by no more than this [m]: so rough an outline may be."""
+A_TRACE = 1e-9
+"""Sliding friction that every model has when it is asked: beside any that rubs a wheel is solved for together with it,
+else by itself, and what the two ways differ by would be there where nothing acts."""
 UNSEEN_IN_FORCE = frozenset({"pose_bias", "time_offset", "grasp_compliance"})
 """Effects on what is seen, not on what moves: they act whenever the body is observed."""
 
@@ -66,11 +69,13 @@ def activity(
     found: dict[str, tuple[Interval, ...] | None] = dict.fromkeys(effects)
     for name, size in wrench_sizes(track, row, effects).items():
         if size is not None:
-            acting = _counts(size, floor)
-            touches = effect_named(name).touches
-            found[name] = intervals(
-                track, acting if touches is None else _touching(track, row, name, touches[2], acting, floor)
-            )
+            acting, effect = _counts(size, floor), effect_named(name)
+            if effect.touches is not None:
+                acting = _touching(track, row, name, effect.touches[2], acting, floor)
+            if effect.lasts is not None and acting.any():
+                moment, gone = (row[COLUMN[column]] for column in effect.lasts)
+                acting = (track.clock >= moment) != (gone > 0.0)
+            found[name] = intervals(track, acting)
     return found
 
 
@@ -92,6 +97,7 @@ def wrench_sizes(track: Track, row: Array, effects: Sequence[str]) -> dict[str, 
     if not shown:
         return found
     rows = np.stack([row, *(without(track, row, name) for name in shown)])
+    rows[:, COLUMN["slide_mu"]] += A_TRACE
     acceleration = accelerations(track, rows, track.seen, 1)
     mass = float(row[COLUMN["mass"]])
     change = mass * (acceleration[0] - acceleration[1:]) * [1.0, 1.0, track.gyration]

@@ -134,6 +134,8 @@ class Effect:
         rhythm: columns of a frequency and of its phase.
         region: columns of a rectangle on the floor in which feet are held: x, y, half of length and width, and angle.
         pins: columns x and y of a place about which the body can only turn.
+        lasts: columns of the moment from which it is there, whether it is felt or not, and of what is 1 where it was
+            there until then.
         remembers: whether more moves than the body, so that its past matters.
         second: whether a baseline may have one such thing already, and stands between the two.
         sticks: whether it is dry friction, which a body at rest does not show the strength of.
@@ -161,6 +163,7 @@ class Effect:
     rhythm: tuple[str, str] | None = None
     region: tuple[str, str, str, str, str] | None = None
     pins: tuple[str, str] | None = None
+    lasts: tuple[str, str] | None = None
     remembers: bool = False
     second: bool = False
     sticks: bool = False
