@@ -109,7 +109,9 @@ def test_a_ground_that_a_patch_has_bent_still_says_where_the_patch_is(
     bent = ground.coordinates + np.log(heavier) * (
         np.array([column == "mass" for column in wheel.columns], dtype=float) - np.isin(wheel.columns, OF_FRICTION)
     )
-    tiles, friction = tile_friction(track, replace(ground, coordinates=bent).believed, WEIGHT, ground.row)
+    tiles, friction = tile_friction(
+        track, replace(ground, found=replace(ground.found, coordinates=bent)).believed, WEIGHT, ground.row
+    )
     x, y, turn = track.seen[0, :3]
     c, s = math.cos(turn), math.sin(turn)
     own = (tiles - [x, y]) @ np.array([[c, -s], [s, c]])

@@ -139,9 +139,9 @@ class _Chosen:
 
 def _jobs(seed: np.random.SeedSequence, bases: Sequence[Fitted], longest: Cuts, options: DiagnoseOptions) -> list[_Job]:
     """Return every variant of every effect on every base that can have it."""
-    grounds = [ground_of(each.hypothesis, each.peak.coordinates[0], longest, options.sensor_floor) for each in bases]
+    grounds = [_ground(each, longest, options) for each in bases]
     for ground in grounds:
-        _ = ground.climbed, ground.first, ground.fine, ground.believed  # threads share them
+        _ = ground.first, ground.fine, ground.believed  # threads share them
     found = [
         (name, variant, base, ground)
         for base, ground in zip(bases, grounds, strict=True)
@@ -150,6 +150,13 @@ def _jobs(seed: np.random.SeedSequence, bases: Sequence[Fitted], longest: Cuts, 
         for variant in range(len(EFFECTS[name].variants))
     ]
     return [_Job(*job, own) for job, own in zip(found, seed.spawn(len(found)), strict=True)]
+
+
+def _ground(base: Fitted, longest: Cuts, options: DiagnoseOptions) -> Ground:
+    """Return what effects are laid on along its path, traced where that was not done yet."""
+    if base.traced is not None:
+        return Ground(base.traced, longest, options.sensor_floor)
+    return ground_of(base.hypothesis, base.peak.coordinates[0], longest, options.sensor_floor)
 
 
 def _begun(options: DiagnoseOptions, job: _Job) -> PathPeak:

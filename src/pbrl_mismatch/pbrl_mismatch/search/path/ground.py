@@ -48,22 +48,68 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Ground:
-    """A fitted hypothesis along its path.
+class Traced:
+    """A hypothesis fitted along the path that it and a left-out wrench together explain.
 
     Attributes:
-        hypothesis: that effects are laid on.
-        coordinates: (K,) its best along the path.
-        cuts: windows.
-        floor: size of a sensor's own error [N].
-        lacks: the wrench that it lacks, and the path.
+        hypothesis: what was fitted.
+        coordinates: (K,).
+        evidence: log evidence by Laplace [nat], on the scale of simulated windows.
+        log_posterior: density at that point, on the same scale [nat].
+        noise_scale: scale of the noise that it needs over all windows, at least one.
+        paid: for the scales that its windows need [nat].
+        lacks: the wrench that was left out about the path, and the path.
+        along: the windows.
     """
 
     hypothesis: Hypothesis
     coordinates: Array
+    evidence: float
+    log_posterior: float
+    noise_scale: float
+    paid: float
+    lacks: ResidualWrench
+    along: Along
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A fitted hypothesis along its path.
+
+    Attributes:
+        found: the fit, and the path.
+        cuts: windows.
+        floor: size of a sensor's own error [N].
+    """
+
+    found: Traced
     cuts: Cuts
     floor: float
-    lacks: ResidualWrench
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """Return what effects are laid on."""
+        return self.found.hypothesis
+
+    @property
+    def coordinates(self) -> Array:
+        """Return (K,) its best along the path."""
+        return self.found.coordinates
+
+    @property
+    def lacks(self) -> ResidualWrench:
+        """Return the wrench that it lacks, and the path."""
+        return self.found.lacks
+
+    @property
+    def evidence(self) -> float:
+        """Return its log evidence along the path [nat], which effects on it are held against."""
+        return self.found.evidence
+
+    @property
+    def climbed(self) -> Along:
+        """Return the windows that are climbed along."""
+        return self.found.along
 
     @property
     def row(self) -> Array:
@@ -76,24 +122,10 @@ class Ground:
         believed = self.hypothesis.as_believed(self.coordinates)
         return residual_wrench(self.cuts.track, self.hypothesis.rows(believed[None])[0])
 
-    def along(self, stride: int) -> Along:
-        """Return the windows along its path."""
-        return laid(self.cuts, self.row, self.lacks, self.floor, stride)
-
-    @cached_property
-    def climbed(self) -> Along:
-        """Return the windows that are climbed along."""
-        return self.along(FINE)
-
-    @cached_property
-    def evidence(self) -> float:
-        """Return its log evidence there [nat], which effects on it are held against."""
-        return float(climb_along(self.climbed, self.hypothesis, self.coordinates[None], ITERATIONS).evidence[0])
-
     @cached_property
     def first(self) -> Look:
         """Return what draws are compared with."""
-        return self._look(self.along(COARSE))
+        return self._look(laid(self.cuts, self.row, self.lacks, self.floor, COARSE))
 
     @cached_property
     def fine(self) -> Look:
@@ -117,34 +149,7 @@ def laid(cuts: Cuts, row: Array, lacks: ResidualWrench, floor: float, stride: in
 
 def ground_of(hypothesis: Hypothesis, coordinates: Array, cuts: Cuts, floor: float) -> Ground:
     """Fit a hypothesis along its own path, from coordinates (K,)."""
-    found = traced(hypothesis, coordinates[None], cuts, floor)
-    row = hypothesis.rows(found.coordinates[None])[0]
-    return Ground(hypothesis, found.coordinates, cuts, floor, residual_wrench(cuts.track, row, size=found.size))
-
-
-@dataclass(frozen=True)
-class Traced:
-    """A hypothesis fitted along the path that it and a left-out wrench together explain.
-
-    Attributes:
-        hypothesis: what was fitted.
-        coordinates: (K,).
-        evidence: log evidence by Laplace [nat], on the scale of simulated windows.
-        log_posterior: density at that point, on the same scale [nat].
-        noise_scale: scale of the noise that it needs over all windows, at least one.
-        paid: for the scales that its windows need [nat].
-        size: of the left-out force [N].
-        along: the windows.
-    """
-
-    hypothesis: Hypothesis
-    coordinates: Array
-    evidence: float
-    log_posterior: float
-    noise_scale: float
-    paid: float
-    size: float
-    along: Along
+    return Ground(traced(hypothesis, coordinates[None], cuts, floor), cuts, floor)
 
 
 def traced(hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float) -> Traced:
@@ -157,11 +162,12 @@ def traced(hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float) -> T
         floor: size of a sensor's own error [N].
     """
     found: Traced | None = None
-    off, lacks = math.inf, None
+    off = math.inf
+    lacks: ResidualWrench | None = None
     for _ in range(ROUNDS):
         row = hypothesis.rows(starts[:1])[0]
         lacks = residual_wrench(cuts.track, row, size=None if lacks is None else lacks.size, about=lacks)
-        last = _traced_along(hypothesis, starts, laid(cuts, row, lacks, floor, FINE), lacks.size)
+        last = _traced_along(hypothesis, starts, laid(cuts, row, lacks, floor, FINE), lacks)
         gained = math.inf if found is None else last.evidence - found.evidence
         # How far a steady error of the sensor reaches was laid down with another mass than was found.
         if found is None or off > SAME_MASS or gained > 0.0:
@@ -174,14 +180,14 @@ def traced(hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float) -> T
     return found
 
 
-def _traced_along(hypothesis: Hypothesis, starts: Array, along: Along, size: float) -> Traced:
-    """Fit a hypothesis along a path, from starts (n, K); `size` is of the force that was left out about it [N]."""
+def _traced_along(hypothesis: Hypothesis, starts: Array, along: Along, lacks: ResidualWrench) -> Traced:
+    """Fit a hypothesis along a path, from starts (n, K); the path is that of what was left out about it."""
     found = climb_along(along, hypothesis, starts, ITERATIONS)
     best = int(np.argmax(found.evidence))
     scale = float(np.sqrt(max(1.0, found.misfit[best].sum() / along.counts.sum())))
     evidence, density = float(found.evidence[best]), found.log_posterior(best)
     paid = -0.5 * float(along.counts @ np.log(weights(along, found.misfit[best : best + 1])[0]))
-    return Traced(hypothesis, found.coordinates[best], evidence, density, scale, paid, size, along)
+    return Traced(hypothesis, found.coordinates[best], evidence, density, scale, paid, lacks, along)
 
 
 def traced_score(found: Traced, kept: Cuts, whole: Cuts, floor: float) -> float:
