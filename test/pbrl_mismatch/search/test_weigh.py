@@ -11,7 +11,7 @@ import pytest
 
 from pbrl_mismatch import EFFECTS, DiagnoseOptions
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.weigh import CLEAR, DISCREPANCY, OF_EXACT, weigh
+from pbrl_mismatch.search.weigh import CLEAR, DISCREPANCY, OF_EXACT, OF_HISTORY, weigh
 
 OPTIONS = DiagnoseOptions()
 
@@ -58,11 +58,19 @@ def test_two_effects_are_the_same_two_in_either_order() -> None:
     assert once["detent", "tether"] == pytest.approx(twice["detent", "tether"])
 
 
-TETHER, SLOPE, DRAG = "tether/0", "floor_slope/0", "viscous_drag/0"
+TETHER, SLOPE, DRAG, POST, LOAD = "tether/0", "floor_slope/0", "viscous_drag/0", "hidden_obstacle/0", "sloshing_load/0"
 
 
 @pytest.mark.parametrize("unexplained", [0.0, 70.0])
-@pytest.mark.parametrize(("first", "second", "share"), [(TETHER, SLOPE, DISCREPANCY), (SLOPE, TETHER, OF_EXACT)])
+@pytest.mark.parametrize(
+    ("first", "second", "share"),
+    [
+        (TETHER, SLOPE, DISCREPANCY),
+        (SLOPE, TETHER, OF_EXACT),
+        (POST, SLOPE, OF_HISTORY),
+        (LOAD, TETHER, OF_HISTORY),
+    ],
+)
 def test_one_effect_more_takes_more_than_a_wrong_law_leaves(
     unexplained: float, first: str, second: str, share: float
 ) -> None:
@@ -72,7 +80,8 @@ def test_one_effect_more_takes_more_than_a_wrong_law_leaves(
             fitted(f"free + {second}", -100.0, 1000.0),
             fitted(f"free + {first} + {second}", 900.0 + more, unexplained),
         )
-        return found["floor_slope", "tether"] - found[(first.split("/")[0],)]
+        both = tuple(sorted(each.split("/")[0] for each in (first, second)))
+        return found[both] - found[(first.split("/")[0],)]
 
     # Of two that were tried, one; a share of what the first explains, of an exact law a small one; what both leave;
     # and clearly.
@@ -81,11 +90,12 @@ def test_one_effect_more_takes_more_than_a_wrong_law_leaves(
 
 
 def test_what_an_exact_law_explains_leaves_less_than_what_a_wrong_one_explains_beside_it() -> None:
-    # The slope explains most, the cord half as much and is a little wrong: what that leaves is more.
-    single, beside = fitted(f"free + {SLOPE}", 900.0), fitted(f"free + {TETHER}", 400.0)
-    found = weights(single, beside, fitted(f"free + {SLOPE} + {TETHER}", 1000.0))
-    gained = found["floor_slope", "tether"] - found["floor_slope",]
-    assert gained == pytest.approx(100.0 - math.log(2.0) - DISCREPANCY * 500.0 - CLEAR)
+    # The slope explains most, the post half as much and is a little wrong: what that leaves is more.
+    single, beside = fitted(f"free + {SLOPE}", 900.0), fitted(f"free + {POST}", 400.0)
+    found = weights(single, beside, fitted(f"free + {SLOPE} + {POST}", 1000.0))
+    gained = found["floor_slope", "hidden_obstacle"] - found["floor_slope",]
+    shapes = math.log(len(EFFECTS["hidden_obstacle"].variants))
+    assert gained == pytest.approx(100.0 - math.log(2.0) - shapes - OF_HISTORY * 500.0 - CLEAR)
 
 
 def test_what_the_likeliest_set_leaves_counts_against_all_alike() -> None:
@@ -130,5 +140,5 @@ def test_what_is_known_beside_the_motion_leaves_no_share_of_the_motion_to_others
     found = weights(fitted(gives, 100.0, beside=200.0), fitted(hinge, -40.0), both)
     assert max(found, key=lambda effects: found[effects]) == ("grasp_compliance", "hidden_hinge")
     # A gain in the motion alone, where the first has explained a lot of it, is what a wrong law leaves to any other.
-    found = weights(fitted(gives, 2000.0), fitted(hinge, -40.0), fitted(both.hypothesis.variant, 2060.0))
+    found = weights(fitted(gives, 2000.0), fitted(hinge, -40.0), fitted(both.hypothesis.variant, 2025.0))
     assert max(found, key=lambda effects: found[effects]) == ("grasp_compliance",)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.fitted import Fitted
@@ -16,8 +17,9 @@ from pbrl_mismatch.search.fitted import Fitted
 VETO, VETO_SHARE = 8.0, 0.05
 """A hypothesis that predicts held-out windows worse than the baseline by this much [nat], and this share of what its
 evidence gained, is not named."""
-DISCREPANCY = 0.04
-"""Share of what a law explains that its being wrong may leave for others to explain."""
+DISCREPANCY, OF_HISTORY = 0.015, 0.04
+"""Share of what a law explains that its being wrong may leave for others to explain; the same of contacts and of what
+moves besides the body: how a crate or a caster is turned follows from all that was before."""
 OF_EXACT = 0.01
 """The same of laws that are exact, for what the smoothed path and the sensor's own error leave."""
 CLEAR = 5.0
@@ -98,8 +100,15 @@ def _of_motion(fitted: Fitted) -> float:
 
 def _left_by(part: Fitted, none: float) -> float:
     """Return what a part leaves for others, as its laws are a little wrong, where nothing explains `none` [nat]."""
-    exact = all(EFFECTS[name].exact for name in part.hypothesis.effects)
-    return (OF_EXACT if exact else DISCREPANCY) * max(_of_motion(part) - none, 0.0)
+    share = max((_discrepancy(EFFECTS[name]) for name in part.hypothesis.effects), default=0.0)
+    return share * max(_of_motion(part) - none, 0.0)
+
+
+def _discrepancy(effect: Effect) -> float:
+    """Return the share of what an effect explains that its law may leave for others."""
+    if effect.exact:
+        return OF_EXACT
+    return OF_HISTORY if effect.remembers or effect.touches is not None else DISCREPANCY
 
 
 def _unexplained(sets: Iterable[Fitted]) -> float:
