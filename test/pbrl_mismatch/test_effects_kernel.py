@@ -103,6 +103,17 @@ def test_second_wheel_is_the_first_wheel_elsewhere(bench: Any) -> None:
     np.testing.assert_allclose(other, one, atol=2e-3)
 
 
+def test_where_on_its_axle_a_wheel_is_that_rolls_freely_no_motion_shows(bench: Any) -> None:
+    world, turn = bench(np.tile([12.0, 7.0, 5.0], (200, 1)), moving(0.2, 0.4)), 0.5
+
+    def along_axle(way: float, rolling: float) -> np.ndarray:
+        place = {"wheel2_x": -0.4 - way * np.sin(turn), "wheel2_y": 0.2 + way * np.cos(turn)}
+        return world.run(wheel2_theta=turn, wheel2_mu_x=rolling, wheel2_mu_y=0.1, **place)
+
+    np.testing.assert_allclose(along_axle(0.5, 0.0), along_axle(0.0, 0.0), atol=1e-9)
+    assert np.abs(along_axle(0.5, 0.05) - along_axle(0.0, 0.05)).max() > 1e-3
+
+
 def test_wheel_slides_as_the_world_model_s_along_its_axis(bench: Any) -> None:
     world = bench(pushed(30.0, 150), moving(0.3))
     box = world.run(wheel_x=-0.4, mu_x=0.05, mu_y=0.1)

@@ -135,6 +135,18 @@ def test_the_border_is_compared_where_it_was_crossed() -> None:
     assert border_error(feet, patch, patch + np.array([0.0, 50.0])) == math.inf
 
 
+@pytest.mark.parametrize(("along", "expected"), [(1e-4, 0.03), (0.2, 0.5)])
+def test_a_wheel_that_rolls_freely_is_compared_across_its_axle(along: float, expected: float) -> None:
+    turn, told = 0.4, {"wheel2_x": 0.1, "wheel2_y": 0.2, "wheel2_mu_x": along, "wheel2_mu_y": 0.2}
+    truth = replace(TRUTH, effects=("second_wheel",), told=told | {"wheel2_theta": turn})
+    c, s = math.cos(turn), math.sin(turn)
+    off = 0.03 * np.array([c, s]) + math.sqrt(0.25 - 0.03**2) * np.array(
+        [-s, c]
+    )  # half a metre, most of it on its axle
+    entry = {"parameters": {"wheel2_x": {"mean": 0.1 + off[0]}, "wheel2_y": {"mean": 0.2 + off[1]}}}
+    assert place_error("second_wheel", truth, entry, walk(), np.array(PATCH)) == pytest.approx(expected)
+
+
 def test_places_moments_and_bias_of_what_was_named_right() -> None:
     entry = report(["tether"], [])["objects"]["table"]["effects"][0]
     assert place_error("tether", TRUTH, entry, walk(), np.array(PATCH)) == pytest.approx(0.05)

@@ -24,6 +24,8 @@ PLACE_COLUMNS = {
     "tether": ("tether_x", "tether_y"),
 }
 """Effects whose place is a point, and the parameters that say where."""
+ROLLS_FREELY = 0.05
+"""A second wheel rolls freely whose friction along is no more than such a share of that across."""
 MOMENT_COLUMNS = {"payload_change": "payload_time"}
 """Effects that begin at a moment, and the parameter that says when."""
 CONTACTS = ("unseen_body",)
@@ -33,9 +35,11 @@ CONTACTS = ("unseen_body",)
 def place_error(effect: str, truth: Truth, entry: Mapping[str, Any], samples: Samples, outline: Array) -> float:
     """Return how far off one effect of a report is in place [m], NaN where it has none.
 
-    A point is compared with a point. Of a patch only that border is compared which feet crossed: the median distance
-    from where they crossed the true border to the claimed one, and the other way round. Of an obstacle only the side
-    that was met: the distance from its point nearest to the object, when they first touch, to the claimed border.
+    A point is compared with a point. A wheel that rolls freely pushes along its axle alone, so no motion shows where
+    on its axle it is: compared is how far it is off across the axle. Of a patch only that border is compared which feet
+    crossed: the median distance from where they crossed the true border to the claimed one, and the other way round. Of
+    an obstacle only the side that was met: the distance from its point nearest to the object, when they first touch, to
+    the claimed border.
 
     Args:
         effect: name.
@@ -49,7 +53,11 @@ def place_error(effect: str, truth: Truth, entry: Mapping[str, Any], samples: Sa
         found = [entry["parameters"].get(column, {}).get("mean") for column in PLACE_COLUMNS[effect]]
         if None in told or None in found:
             return math.nan
-        return float(np.hypot(*(np.array(found, dtype=float) - np.array(told, dtype=float))))
+        off = np.array(found, dtype=float) - np.array(told, dtype=float)
+        if effect == "second_wheel" and truth.told["wheel2_mu_x"] <= ROLLS_FREELY * truth.told["wheel2_mu_y"]:
+            rolls = truth.told["wheel2_theta"]
+            return float(abs(off @ [math.cos(rolls), math.sin(rolls)]))
+        return float(np.hypot(*off))
     where, place = entry.get("where"), truth.place.get(effect, [])
     if where is None or len(place) < 3:
         return math.nan
