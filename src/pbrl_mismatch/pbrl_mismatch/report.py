@@ -250,4 +250,5 @@ def sentence(name: str, mismatch: bool, verdict: Verdict, found: Findings) -> st
     if not found.effects:
         return f"{name}: something is left out ({chance}), and it is none of what the library knows"
     what = " and ".join(finding.effect for finding in found.effects)
-    return f"{name}: {what} is left out ({100 * found.effects[0].probability:.0f} %, {chance})"
+    left = "is" if len(found.effects) == 1 else "are"
+    return f"{name}: {what} {left} left out ({100 * found.effects[0].probability:.0f} %, {chance})"

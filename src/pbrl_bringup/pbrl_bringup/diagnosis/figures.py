@@ -20,6 +20,7 @@ from pbrl_control.planar import placed
 from pbrl_mismatch.data.missing import in_missing
 from pbrl_mismatch.data.residual import ResidualWrench
 from pbrl_mismatch.diagnose import ObjectDiagnosis
+from pbrl_mismatch.observability.strengths import rounded
 
 Array = NDArray[np.float64]
 
@@ -164,7 +165,7 @@ def held_out(found: ObjectDiagnosis) -> str:
         axes.barh(list(bars), known, color=[colour for _, colour in bars.values()])
         for row, value in enumerate(known):
             if math.isfinite(value):
-                axes.text(value, row, f" {value:.2g}", va="center", fontsize=8)
+                axes.text(value, row, f" {rounded(value)}", va="center", fontsize=8)
         axes.set_xlabel(label, fontsize=9)
         axes.margins(x=0.25)
         axes.locator_params(axis="x", nbins=4)
