@@ -18,7 +18,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pbrl_bag.kernel_options import LEAF
+from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP, push, resist
+from pbrl_model.kernel import GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -27,6 +29,12 @@ FOOT = 16
 """Numbers of a foot: lever (x, y) [m], limit of its friction [N], load on it [N], cosine and sine of its caster's
 heading, as `laws_kernel.lay_feet` writes them; then what iterations keep of each friction. Two more rows are the second
 wheel's and the baseline's, of which `holding_kernel.lay_wheel` writes lever, both limits and heading."""
+
+
+@njit(**LEAF, forceinline=True)
+def weight(p: Array, mass: float) -> float:
+    """Return what stands on the floor [N] where `mass` [kg] moves as one body: a load that swings hangs in it."""
+    return GRAVITY * (mass + p[at.SLOSH_MASS])
 
 
 @njit(**LEAF, forceinline=True)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
-from pbrl_mismatch.kernels.friction_kernel import ROLLS, RUBS, rub_along, rub_in_ellipse
-from pbrl_model.kernel import GRAVITY, SINGULAR, box_impulses, joint_rows
+from pbrl_mismatch.kernels.friction_kernel import ROLLS, RUBS, rub_along, rub_in_ellipse, weight
+from pbrl_model.kernel import SINGULAR, box_impulses, joint_rows
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def wheel_limits(
     p: Array, state: Array, c: float, s: float, mass: float, com: Array, axes: Array
 ) -> tuple[float, float]:
     """Return what the baseline's wheel holds along and across at most [N]; for arguments see `lay_feet`."""
-    limit = mass * GRAVITY
+    limit = weight(p, mass)
     along, across = p[at.MU_X] * limit, p[at.MU_Y] * limit
     if p[at.CONE] > 0.0 and across < 0.0:
         across = along

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP, SETTLING, push, resist
-from pbrl_mismatch.kernels.friction_kernel import ROLLS, RUBS, SCRUBS, TWISTS, bent, rub_along, rub_in_ellipse
+from pbrl_mismatch.kernels.friction_kernel import ROLLS, RUBS, SCRUBS, TWISTS, bent, rub_along, rub_in_ellipse, weight
 from pbrl_mismatch.kernels.holding_kernel import hold_wheel, patch_share
 from pbrl_mismatch.kernels.own_kernel import how_many, own_laws
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
-from pbrl_model.kernel import GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -85,10 +84,10 @@ def springs(
     acc[3] += p[at.DRAG_LINEAR]
     acc[5] += p[at.DRAG_LINEAR]
     acc[8] += p[at.DRAG_TURN]
-    weight = mass * GRAVITY
+    down = weight(p, mass)
     on = between(time, p[at.FORCE_START], p[at.FORCE_END])
-    acc[0] += weight * p[at.SLOPE_X] + on * p[at.STEADY_X]
-    acc[1] += weight * p[at.SLOPE_Y] + on * p[at.STEADY_Y]
+    acc[0] += down * p[at.SLOPE_X] + on * p[at.STEADY_X]
+    acc[1] += down * p[at.SLOPE_Y] + on * p[at.STEADY_Y]
     acc[2] += on * p[at.STEADY_TORQUE]
     if p[at.PERIODIC_FREQUENCY] > 0.0 and on > 0.0:
         wave = on * math.sin(2.0 * math.pi * p[at.PERIODIC_FREQUENCY] * time + p[at.PERIODIC_PHASE])
@@ -231,7 +230,7 @@ def lay_feet(
         room: (F + 2, FOOT) of which the first six numbers of the feet are written.
     """
     count = feet.shape[0]
-    even, ox, oy, gx, gy = mass * GRAVITY / count, 0.0, 0.0, 0.0, 0.0
+    even, ox, oy, gx, gy = weight(p, mass) / count, 0.0, 0.0, 0.0, 0.0
     rolls = on_casters(p)
     if p[at.LOAD_X] != 0.0 or p[at.LOAD_Y] != 0.0 or p[at.LOAD_HEIGHT] > 0.0:
         ox, oy, gx, gy = tilt(p, c, s, acc[0], acc[1], even * count, feet)
@@ -308,7 +307,8 @@ def resistances(
         acc[6] += xt
         acc[7] += yt
         acc[8] += tt
-    along, across = mass * GRAVITY * p[at.WHEEL2_MU_X], mass * GRAVITY * p[at.WHEEL2_MU_Y]
+    down = weight(p, mass)
+    along, across = down * p[at.WHEEL2_MU_X], down * p[at.WHEEL2_MU_Y]
     if along > 0.0 or across > 0.0:
         # One limit alone is that in both axes.
         across = along if across < 0.0 else across

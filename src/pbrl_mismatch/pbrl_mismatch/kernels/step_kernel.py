@@ -18,10 +18,11 @@ from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.account_kernel import CREEP
 from pbrl_mismatch.kernels.contact_kernel import contacts
 from pbrl_mismatch.kernels.crate_kernel import CRUSHING, move_crate
+from pbrl_mismatch.kernels.friction_kernel import weight
 from pbrl_mismatch.kernels.holding_kernel import has_wheel, hold, lay_wheel
 from pbrl_mismatch.kernels.laws_kernel import dry, lay_feet, on_casters, on_feet, resistances, springs, swivel
 from pbrl_mismatch.kernels.state import CASTERS, FIRST_CASTER, SLOSH
-from pbrl_model.kernel import ERROR_BIAS, GRAVITY, cos_sin
+from pbrl_model.kernel import ERROR_BIAS, cos_sin
 
 Array = NDArray[np.float64]
 
@@ -129,9 +130,10 @@ def respond(
         dt: in which that happens [s].
 
     Returns:
-        The acceleration (x, y, turn) without the impulses that come last.
+        The acceleration (x, y, turn).
     """
     vx, vy, omega = state[3], state[4], state[5]
+    before_x, before_y, before = vx, vy, omega
     rubs, wheel = dry(p), has_wheel(p)
     coupled = wheel and (rubs or acc[3] + acc[5] + acc[8] > 0.0)
     if rubs or coupled:
@@ -153,17 +155,16 @@ def respond(
                 vx, vy, omega = 0.0, 0.0, 0.0
     else:
         vx, vy, omega = solve_resisted(state, mass, inertia, acc, dt)
-    ax, ay, turned = (vx - state[3]) / dt, (vy - state[4]) / dt, (omega - state[5]) / dt
     state[3], state[4], state[5] = vx, vy, omega
     hold(p, state, c, s, mass, inertia, com, axes, dt, wheel and not coupled)
     if p[at.MU_GROUND] > 0.0:
-        ground = p[at.MU_GROUND] * GRAVITY * dt
+        ground = p[at.MU_GROUND] * weight(p, mass) / mass * dt
         speed = math.sqrt(state[3] ** 2 + state[4] ** 2 + inertia / mass * state[5] ** 2)
         kept = 1.0 - ground / speed if speed > ground else 0.0
         state[3] *= kept
         state[4] *= kept
         state[5] *= kept
-    return ax, ay, turned
+    return (state[3] - before_x) / dt, (state[4] - before_y) / dt, (state[5] - before) / dt
 
 
 @njit(**LEAF, forceinline=True)
