@@ -64,5 +64,13 @@ def test_casters_and_a_body_that_was_met_stay_between_grasps(walked: Any) -> Non
     assert np.abs(state[first, FIRST_CASTER]) > 0.0
 
 
+def test_every_caster_begins_at_a_turn_of_its_own_and_one_that_is_told_none_as_the_first(walked: Any) -> None:
+    turns = {"caster_turn2": 0.5, "caster_turn4": -1.1}
+    begin = walked(**LAWS["casters"], **turns)[0][0, FIRST_CASTER:SLOSH].reshape(-1, 2)
+    heading = np.arctan2(begin[:, 1], begin[:, 0])
+    wanted = 0.3 + np.array([0.0, 0.5, 0.0, -1.1, *np.zeros(len(heading) - 4)])  # the body begins at a heading of zero
+    np.testing.assert_allclose(heading, wanted, atol=1e-9)
+
+
 def test_what_does_not_move_is_not_rehearsed(walked: Any) -> None:
     np.testing.assert_array_equal(walked(slide_mu=0.1)[0], 0.0)

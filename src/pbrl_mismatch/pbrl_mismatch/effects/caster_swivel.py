@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pbrl_mismatch.effects.effect import Effect, Parameter, Scene, plain, positive
 
+HEADINGS = ("caster_heading", "caster_turn2", "caster_turn3", "caster_turn4")
+"""How casters were turned when the recording began: the first in the body, the others from there."""
+
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
     """Return what is believed of its parameters."""
@@ -13,7 +16,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
         positive("caster_scrub", 0.03, 0.9),
         positive("caster_twist", 0.04, 0.9),
         positive("caster_lay", 0.02, 1.0),
-        plain("caster_heading", 0.0, 1.5),
+        *(plain(column, 0.0, 1.5) for column in HEADINGS),
     )
 
 
@@ -35,7 +38,7 @@ EFFECT = Effect(
             "caster_roll",
             "caster_scrub",
             "caster_twist",
-            "caster_heading",
+            *HEADINGS,
         ),
         (
             "caster_trail",
@@ -43,11 +46,11 @@ EFFECT = Effect(
             "caster_scrub",
             "caster_twist",
             "caster_lay",
-            "caster_heading",
+            *HEADINGS,
         ),
     ),
     direction="velocity",
-    angles=("caster_heading",),
+    angles=HEADINGS,
     linear=("caster_roll", "caster_scrub", "caster_twist"),
     remembers=True,
     sticks=True,

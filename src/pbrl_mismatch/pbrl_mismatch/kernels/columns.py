@@ -6,8 +6,9 @@ each axis alone, as the thesis and `pbrl_model.kernel` do; 1 limits both togethe
 does. A `mu_y` or `wheel2_mu_y` below zero stands for one that is the same as that along x, a
 `torque_scale` below zero for one that is the same as `force_scale`. `load_x`, `load_y` are where the feet's load is
 centred, off their middle; a force at the height `load_height` over the floor moves it on. `payload_gone` 1 stands for
-a load that is there from the start and is taken off. `patch_roll` is what holds back the
-baseline's wheel on the patch at least, along either axis, over the body's weight.
+a load that is there from the start and is taken off. `caster_heading` is how the first caster was turned in the body
+when a recording began, `caster_turn2` to `caster_turn4` how far others were from there. `patch_roll` is what holds back
+the baseline's wheel on the patch at least, along either axis, over the body's weight.
 
 The last `SPARE` columns are for laws that a user adds: `name_columns` gives some of them names and units.
 """
@@ -87,6 +88,9 @@ _EFFECT_COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("caster_twist", "1", 0.0),
     ("caster_lay", "m", math.inf),
     ("caster_heading", "rad", 0.0),
+    ("caster_turn2", "rad", 0.0),
+    ("caster_turn3", "rad", 0.0),
+    ("caster_turn4", "rad", 0.0),
     ("slosh_mass", "kg", 0.0),
     ("slosh_x", "m", 0.0),
     ("slosh_y", "m", 0.0),

@@ -59,6 +59,8 @@ def rehearse_windows(
     state[UNSEEN], state[UNSEEN + 1] = p[at.UNSEEN_X], p[at.UNSEEN_Y]
     for i in range(CASTERS):
         heading = seen[0, 2] + p[at.CASTER_HEADING]
+        if 1 <= i <= at.CASTER_TURN4 - at.CASTER_TURN2 + 1:
+            heading += p[at.CASTER_TURN2 + i - 1]
         state[FIRST_CASTER + 2 * i], state[FIRST_CASTER + 2 * i + 1] = math.cos(heading), math.sin(heading)
     stride, t, begin = 1 if swings else STRIDES, 0, 0
     for w in range(span.shape[0]):

@@ -22,6 +22,7 @@ from pbrl_mismatch.search.objective import Objective, scattered
 from pbrl_mismatch.search.path.along import lay_along
 from pbrl_mismatch.search.path.climb import climb_along
 from pbrl_mismatch.search.path.ground import FINE, Traced, traced_score
+from pbrl_mismatch.search.path.turned import turned
 from pbrl_model.fitting.guesses import axle, circle, pivot
 
 Array = NDArray[np.float64]
@@ -255,7 +256,7 @@ def fit_baseline(
     def climbed(kind: Hypothesis, starts: Array) -> Fitted:
         found = climb_along(along, kind, starts, BASELINE_STEPS)
         order = np.argsort(-found.evidence, kind="stable")
-        kept = apart(found.coordinates[order], kind.spread, KEPT_OF_BASELINE)
+        kept = turned(along, kind, apart(found.coordinates[order], kind.spread, KEPT_OF_BASELINE))
         return fit_from(kind, stages, kept, options.model_copy(update={"candidates": len(kept)}))
 
     found, held = climbed(hypothesis, starts), hypothesis.fixed(BELIEVED)

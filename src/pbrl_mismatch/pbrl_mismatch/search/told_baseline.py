@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_mismatch.effects.caster_swivel import HEADINGS
 from pbrl_mismatch.effects.effect import Parameter
 from pbrl_mismatch.effects.hidden_hinge import AT_REST
 from pbrl_mismatch.errors import MismatchError
@@ -32,7 +33,7 @@ LEAST_SPREAD = 1e-4
 ANY_TURN = 1.5
 """Spread of an angle that says nothing of the next recording [rad]."""
 OF_THE_MOMENT = {
-    "caster_heading": ANY_TURN,
+    **dict.fromkeys(HEADINGS, ANY_TURN),
     "periodic_phase": ANY_TURN,
     "pivot_off_x": AT_REST,
     "pivot_off_y": AT_REST,

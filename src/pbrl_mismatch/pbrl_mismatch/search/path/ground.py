@@ -15,6 +15,7 @@ from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.search.hypothesis import Hypothesis, step_sizes
 from pbrl_mismatch.search.path.along import Along, lay_along
 from pbrl_mismatch.search.path.climb import climb_along, weights
+from pbrl_mismatch.search.path.turned import turned
 
 Array = NDArray[np.float64]
 
@@ -167,7 +168,9 @@ def traced(hypothesis: Hypothesis, starts: Array, cuts: Cuts, floor: float) -> T
     for _ in range(ROUNDS):
         row = hypothesis.rows(starts[:1])[0]
         lacks = residual_wrench(cuts.track, row, size=None if lacks is None else lacks.size, about=lacks)
-        last = _traced_along(hypothesis, starts, laid(cuts, row, lacks, floor, FINE), lacks)
+        along = laid(cuts, row, lacks, floor, FINE)
+        starts = turned(along, hypothesis, starts) if found is None else starts
+        last = _traced_along(hypothesis, starts, along, lacks)
         gained = math.inf if found is None else last.evidence - found.evidence
         # How far a steady error of the sensor reaches was laid down with another mass than was found.
         if found is None or off > SAME_MASS or gained > 0.0:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pbrl_mismatch.data.residual import ResidualWrench
 from pbrl_mismatch.data.track import Track
+from pbrl_mismatch.effects.caster_swivel import HEADINGS
 from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
@@ -23,6 +24,7 @@ from pbrl_mismatch.search.path.regions import tile_friction, with_regions
 from pbrl_mismatch.search.path.rhythms import with_rhythms
 from pbrl_mismatch.search.path.screen import screen
 from pbrl_mismatch.search.path.splits import with_splits
+from pbrl_mismatch.search.path.turned import turned
 from pbrl_model.kernel import GRAVITY
 
 Array = NDArray[np.float64]
@@ -76,6 +78,8 @@ def starts_of(
     begun = climb_along(along, hypothesis, np.concatenate(starts), BEGUN)
     best = begun.coordinates[each_first(begun.evidence, [len(each) for each in starts])]
     kept = best[going_on(best, hypothesis, effect, options.keep[0])]
+    if set(effect.variants[variant]) & set(HEADINGS):
+        kept = turned(ground.climbed, hypothesis, kept)
     found = climb_along(ground.climbed, hypothesis, kept, CLIMBED)
     # At the top a misfit says what a place is worth: of those that were gone on with beside the best, one more is left.
     most = options.keep[0] + int(len(kept) > options.keep[0])
