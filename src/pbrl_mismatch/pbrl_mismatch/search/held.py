@@ -75,7 +75,7 @@ def held_starts(
         options = options.model_copy(update={"draws": MORE_DRAWS * options.draws})
     draws, afresh = drawn(rng, hypothesis, effect, variant, base, ground, options)
     for k, column in enumerate(hypothesis.columns):
-        if column in SOFT:
+        if column in SOFT and column in effect.variants[variant]:
             draws[:, k] = hypothesis.mean[k] - SOFT[column] * hypothesis.spread[k]
     draws = hypothesis.believable(draws[afresh])
     objective = Objective(hypothesis, shortest, options.sensor_floor)
