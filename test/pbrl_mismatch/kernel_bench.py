@@ -12,6 +12,24 @@ from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 
+DT = 0.01
+"""Of a step [s]."""
+
+
+def pushed(force: float, steps: int = 200) -> Array:
+    """Return a steady push along x."""
+    return np.tile([force, 0.0, 0.0], (steps, 1))
+
+
+def moving(speed: float, omega: float = 0.0) -> Array:
+    """Return a state that goes along x and turns."""
+    return np.array([0.0, 0.0, 0.0, speed, 0.0, omega])
+
+
+def speeds(path: Array) -> Array:
+    """Return how fast poses (T, 3) go from each to the next."""
+    return np.diff(path, axis=0) / DT
+
 
 @dataclass(frozen=True)
 class Bench:
@@ -26,7 +44,7 @@ class Bench:
 
     wrench: Array
     start: Array = field(default_factory=lambda: np.zeros(6))
-    dt: float = 0.01
+    dt: float = DT
     heading: Array | None = None
 
     def cuts(self) -> Cuts:
