@@ -56,7 +56,7 @@ class Bench:
             object="table",
             motions=(),
             felt=np.ascontiguousarray(self.wrench, dtype=float),
-            mount=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+            mount=np.column_stack([np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), self.dt * np.arange(count)]),
             seen=seen,
             clock=self.dt * np.arange(count),
             begin=np.array([0]),

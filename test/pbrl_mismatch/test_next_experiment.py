@@ -81,7 +81,7 @@ def turned(track: Any, angle: float) -> Any:
         seen[:, 2] + angle,
         seen[:, 3:5] @ turn.T,
     )
-    mount[:, :2], mount[:, 2:] = mount[:, :2] @ turn.T, mount[:, 2:] @ turn.T
+    mount[:, :2], mount[:, 2:4] = mount[:, :2] @ turn.T, mount[:, 2:4] @ turn.T
     pivot[:, :2], pivot[:, 2] = pivot[:, :2] @ turn.T + [3.0, -2.0], pivot[:, 2] + angle
     return replace(track, seen=seen, mount=mount, pivot=pivot)
 

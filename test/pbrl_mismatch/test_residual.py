@@ -65,7 +65,7 @@ def test_coverage_of_a_random_wrench_is_as_stated(track: Any) -> None:
         taken = track.felt.copy()
         c, s = track.mount[:, 0], track.mount[:, 1]
         turned = np.stack([c * drawn[:, 0] + s * drawn[:, 1], -s * drawn[:, 0] + c * drawn[:, 1]], -1)
-        arm = track.mount[:, 2:]
+        arm = track.mount[:, 2:4]
         track.felt[:, :2] -= turned
         track.felt[:, 2] -= drawn[:, 2] - (arm[:, 0] * drawn[:, 1] - arm[:, 1] * drawn[:, 0])
         found = residual_wrench(track, table_row(), size=3.0)

@@ -57,7 +57,7 @@ def test_pose_bias_moves_what_is_seen_and_nothing_else(bench: Any) -> None:
     # The lever of the push was taken from what was seen: the moment that the sensor's place makes is made good.
     world = bench(wrench, np.array([*shown[0], 0.0, 0.0, 0.0]), heading=shown[:-1, 2])
     cuts = world.cuts()
-    cuts.track.mount[:, 2:] = true[:-1, :2] - shown[:-1, :2]
+    cuts.track.mount[:, 2:4] = true[:-1, :2] - shown[:-1, :2]
     row = neutral_row()
     for name, value in {"mass": MASS, "tag_x": 0.1, "tag_y": 0.05, "tag_theta": 0.2}.items():
         row[COLUMN[name]] = value

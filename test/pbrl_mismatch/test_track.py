@@ -63,7 +63,7 @@ def test_the_start_of_a_grasp_is_not_taken_for_rest(recording: Recording, motion
 
 def test_the_sensor_s_wrench_turned_back_is_what_acts_at_the_centre_of_mass(recording: Recording) -> None:
     track = track_of(recording, "table")
-    c, s, x, y = track.mount.T
+    c, s, x, y, _ = track.mount.T
     np.testing.assert_allclose(c**2 + s**2, 1.0)
     force = np.stack([c * track.felt[:, 0] - s * track.felt[:, 1], s * track.felt[:, 0] + c * track.felt[:, 1]], -1)
     torque = track.felt[:, 2] + x * force[:, 1] - y * force[:, 0]
@@ -84,6 +84,28 @@ def test_the_axes_are_the_body_s_when_it_was_first_held_and_the_same_in_each_gra
     # The gripper is smoothed in each grasp alone: its turn differs by that, and by no more.
     np.testing.assert_allclose(cut.mount[half:, :2], whole.mount[half:, :2], atol=0.02)
     assert list(cut.begin) == [0, half] and list(cut.last) == [half - 1, len(motion.wrench) - 1]
+    # The sensor was read before the grasp, of which both are parts.
+    np.testing.assert_allclose(cut.mount[:, 4], whole.mount[:, 4])
+
+
+def test_a_drift_counts_from_when_the_sensor_was_read_at_rest(recording: Recording) -> None:
+    rate, (whole,) = 0.3, recording.grasps
+    # Let go for a moment, and taken again while it still rolls: the first moments of that are left out.
+    recording = replace(recording, grasps=(replace(whole, end=10.0), replace(whole, start=12.0)))
+    drifting = {
+        side: replace(stream, torque=stream.torque + rate * stream.time[:, None] * np.array([0.0, 0.0, 1.0]))
+        for side, stream in recording.wrenches.items()
+    }
+    geometry = recording.bodies["table"]
+    true, told = (
+        lay_track(each, motions, geometry, body_of(geometry, motions[0].oriented))
+        for each in (recording, replace(recording, wrenches=drifting))
+        for motions in [[after_closing(motion) for motion in motions_of(each, "table")]]
+    )
+    off = told.felt - true.felt
+    assert len(true.begin) == 2 and true.clock[true.begin[1]] == pytest.approx(12.0 + CLOSING)
+    np.testing.assert_allclose(off[:, :2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(np.abs(off[:, 2]), rate * true.mount[:, 4], atol=rate * true.dt)
 
 
 def _part(motion: Motion, first: int, last: int) -> Motion:

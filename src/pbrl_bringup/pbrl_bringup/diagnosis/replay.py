@@ -134,7 +134,7 @@ def replay_of(recording: Recording, found: ObjectDiagnosis, options: DiagnoseOpt
         before=simulated[0, w, n],
         after=simulated[1, w, n] if repaired else None,
         force=force,
-        hand=track.seen[step, :2] + mount[:, 2:],
+        hand=track.seen[step, :2] + mount[:, 2:4],
         held_out=_held_out(cuts, options, origin),
         unbelieved=tuple((each.start - origin, each.end - origin, each.why) for each in track.missing),
         seconds=options.block,

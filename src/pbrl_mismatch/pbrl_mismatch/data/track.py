@@ -18,7 +18,7 @@ from pbrl_mismatch.data.missing import Missing
 from pbrl_mismatch.errors import MismatchError
 from pbrl_model.geometry import MassProperties, bounding_box, check_polygon
 from pbrl_model.sensing.clock import smooth_gripper
-from pbrl_model.sensing.motion import MARGIN, Motion
+from pbrl_model.sensing.motion import MARGIN, Motion, read_at_rest
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -38,7 +38,8 @@ class Track:
         object: its name.
         motions: the episodes.
         felt: (T, 3) planar wrench in the sensor's axes, at the sensor [N, N, N m].
-        mount: (T, 4) cosine and sine of the sensor's turn; its place from the nominal centre of mass [m], world axes.
+        mount: (T, 5) cosine and sine of the sensor's turn; its place from the nominal centre of mass [m], world axes;
+            how long ago it was read at rest [s].
         seen: (T, 6) smoothed states of the nominal centre of mass.
         clock: (T,) [s].
         begin: (E,) first step of each episode.
@@ -165,7 +166,7 @@ def origin_of(state: Array, com: Array) -> Array:
 def _sensed(
     recording: Recording, motion: Motion, com: Array, first: dict[str, tuple[Array, float]]
 ) -> tuple[Array, Array]:
-    """Return the wrench in the sensor's axes (T, 3) and how the sensor was mounted (T, 4).
+    """Return the wrench in the sensor's axes (T, 3) and how the sensor was mounted (T, 5).
 
     With two grippers there is one sensor in this model, half-way between the two: what acts on the body is the same,
     and a fault is then one that both share.
@@ -181,7 +182,10 @@ def _sensed(
     c, s = np.cos(turn), np.sin(turn)
     fx, fy = motion.wrench[:, 0], motion.wrench[:, 1]
     tau = motion.wrench[:, 2] - (arm[:, 0] * fy - arm[:, 1] * fx)
-    return np.column_stack([c * fx + s * fy, -s * fx + c * fy, tau]), np.column_stack([c, s, arm])
+    start = float(motion.time[0])
+    read = np.mean([read_at_rest(recording, gripper, motion.object, start) for gripper in motion.grippers])
+    mount = np.column_stack([c, s, arm, motion.time[:-1] - read])
+    return np.column_stack([c * fx + s * fy, -s * fx + c * fy, tau]), mount
 
 
 def _mounted(

@@ -21,7 +21,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 EFFECT = Effect(
     name="wrench_bias",
     summary="The force sensor reads an offset, or one that drifts.",
-    equation="felt = true + b or b [t > t_0] or d (t - t_grasp), in the sensor's axes, after it was read at rest",
+    equation="felt = true + b or b [t > t_0] or d (t - t_rest), in the sensor's axes, read at rest at t_rest",
     shows="A force that is constant in the gripper's axes: turn the body.",
     parameters=parameters,
     variants=(

@@ -144,7 +144,7 @@ def simulate_window(
                 state[1] += dy
                 state[3] -= state[5] * dy
                 state[4] += state[5] * dx
-        acting(p, felt, mount, seen, t, span[BEGIN], span[LAST], clock[t], clock[span[BEGIN]], body, com, wrench)
+        acting(p, felt, mount, seen, t, span[BEGIN], span[LAST], clock[t], body, com, wrench)
         where = knots * k / steps
         knot = int(where)
         share = where - knot
@@ -192,7 +192,8 @@ def simulate_serial(
         extra: (P, W, K, 3) wrench in the body's axes that is added [N, N, N m], straight between K knots that are
             spread evenly over the window; K at least 1.
         felt: (T, 3) wrench in the sensor's axes [N, N, N m].
-        mount: (T, 4) cosine and sine of the sensor's turn, its place from the nominal centre of mass [m], world axes.
+        mount: (T, 5) cosine and sine of the sensor's turn; its place from the nominal centre of mass [m], world axes;
+            how long ago it was read at rest [s], so that an older offset is known.
         seen: (T, 6) smoothed states of the nominal centre of mass.
         clock: (T,) times of the steps [s].
         span: (W, 4) first step, steps, first and last step of the episode; in the order of their first steps.
@@ -300,7 +301,7 @@ def step_seen(
 ) -> None:
     """Move a true state (STATE,) from step `t` to the next with a wrench `extra` (3,) in world axes added."""
     mass, inertia = load_now(p, clock[t], body, com)
-    acting(p, felt, mount, seen, t, span[BEGIN], span[LAST], clock[t], clock[span[BEGIN]], body, com, wrench)
+    acting(p, felt, mount, seen, t, span[BEGIN], span[LAST], clock[t], body, com, wrench)
     wrench[0] += extra[0]
     wrench[1] += extra[1]
     wrench[2] += extra[2]

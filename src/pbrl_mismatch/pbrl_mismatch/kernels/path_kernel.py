@@ -84,7 +84,7 @@ def accelerate(
     mass, inertia = load_now(p, clock[step], body, com)
     to_truth(p, told, body, com, state)
     rx, ry, vx, vy, omega = told[0] - state[0], told[1] - state[1], state[3], state[4], state[5]
-    acting(p, felt, mount, seen, step, span[BEGIN], span[LAST], clock[step], clock[span[BEGIN]], body, com, wrench)
+    acting(p, felt, mount, seen, step, span[BEGIN], span[LAST], clock[step], body, com, wrench)
     # As in `step_body`, forces act where the body is at the end of a step.
     state[0] += vx * dt
     state[1] += vy * dt

@@ -1,7 +1,7 @@
 """Compiled: from what sensors say to what acts: faults of sensors undone, mass and its centre now, start states.
 
-`felt` (T, 3) is the wrench in the sensor's axes (planar), `mount` (T, 4) cosine and sine of the sensor's turn and its
-place from the nominal centre of mass as tags saw it [m], world axes.
+`felt` (T, 3) is the wrench in the sensor's axes (planar), `mount` (T, 5) cosine and sine of the sensor's turn, its
+place from the nominal centre of mass as tags saw it [m], world axes, and how long ago it was read at rest [s].
 """
 
 from __future__ import annotations
@@ -61,7 +61,6 @@ def acting(
     first: int,
     last: int,
     time: float,
-    begun: float,
     body: Array,
     com: Array,
     out: Array,
@@ -71,13 +70,12 @@ def acting(
     Args:
         p: (WIDTH,) parameter row.
         felt: (T, 3).
-        mount: (T, 4).
+        mount: (T, 5).
         seen: (T, 6) smoothed states of the nominal centre of mass.
         t: step.
         first: first step of the episode.
         last: last step of the episode.
         time: of the step [s].
-        begun: when the episode began [s]; just before, the sensor was read at rest, so that an older offset is known.
         body: see `load_now`.
         com: (2,) centre of mass in the body's frame [m].
         out: (3,) written.
@@ -89,9 +87,9 @@ def acting(
         before = min(math.floor(place), last - 1) if last > first else first
         share = place - before if last > first else 0.0
     after = min(before + 1, last)
-    on, since = 1.0, time - begun
+    on, since = 1.0, mount[t, 4]
     if p[at.BIAS_START] > -math.inf:
-        on = between(time, p[at.BIAS_START], math.inf) - between(begun, p[at.BIAS_START], math.inf)
+        on = between(time, p[at.BIAS_START], math.inf) - between(time - since, p[at.BIAS_START], math.inf)
     fx = felt[before, 0] + share * (felt[after, 0] - felt[before, 0]) - on * p[at.BIAS_X] - p[at.DRIFT_X] * since
     fy = felt[before, 1] + share * (felt[after, 1] - felt[before, 1]) - on * p[at.BIAS_Y] - p[at.DRIFT_Y] * since
     tau = felt[before, 2] + share * (felt[after, 2] - felt[before, 2])

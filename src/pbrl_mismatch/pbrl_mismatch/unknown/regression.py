@@ -275,7 +275,7 @@ def _through(track: Track, row: Array, residual: ResidualWrench, values: Array) 
 
 def _pushed(track: Track, world: Array) -> Track:
     """Return a track whose sensor felt a wrench (T, 3) at the centre of mass, world axes, more."""
-    c, s, arm = track.mount[:, 0], track.mount[:, 1], track.mount[:, 2:]
+    c, s, arm = track.mount[:, 0], track.mount[:, 1], track.mount[:, 2:4]
     turned = np.stack([c * world[:, 0] + s * world[:, 1], -s * world[:, 0] + c * world[:, 1]], -1)
     moment = world[:, 2] - (arm[:, 0] * world[:, 1] - arm[:, 1] * world[:, 0])
     return replace(track, felt=track.felt + np.column_stack([turned, moment]))

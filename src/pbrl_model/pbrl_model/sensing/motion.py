@@ -111,8 +111,7 @@ def reference_reading(
     Raises:
         ModelError: there are too few readings before the grasp, so weight and bias cannot be known.
     """
-    first, last = max(grasp - REFERENCE_SPAN[0], free_since + REFERENCE_SPAN[1]), grasp - REFERENCE_SPAN[1]
-    keep = (stream.time >= first) & (stream.time <= last)
+    keep = _at_rest(stream, grasp, free_since)
     if int(np.sum(keep)) < LEAST_READINGS:
         raise ModelError(
             f"{what}: expected at least {LEAST_READINGS} readings in the second before the grasp at t = {grasp:.2f} s "
@@ -122,6 +121,32 @@ def reference_reading(
     when = np.array([stream.time[keep].mean()])
     rotation, _ = smooth_gripper(_within(pose, grasp - MARGIN, grasp, what), when)
     return ReferenceReading(wrench, rotation[0])
+
+
+def _at_rest(stream: WrenchStream, grasp: float, free_since: float) -> NDArray[np.bool_]:
+    """Return which readings the reference reading is the mean of."""
+    first, last = max(grasp - REFERENCE_SPAN[0], free_since + REFERENCE_SPAN[1]), grasp - REFERENCE_SPAN[1]
+    return (stream.time >= first) & (stream.time <= last)
+
+
+def read_at_rest(recording: Recording, gripper: str, name: str, start: float) -> float:
+    """Return when the offset of a gripper's sensor was last known [s]: at its reference reading before a grasp.
+
+    Where nothing was read before it, or nothing is compensated, that is the beginning of the grasp.
+
+    Args:
+        recording: as read.
+        gripper: whose sensor.
+        name: of the object that it holds.
+        start: a time in the grasp [s].
+
+    Raises:
+        ModelError: the gripper does not hold the object then.
+    """
+    stream = recording.wrenches[gripper]
+    grasp, free_since, _ = _grasp_of(recording, gripper, name, start)
+    keep = _at_rest(stream, grasp, free_since)
+    return float(stream.time[keep].mean()) if stream.exerted_on == "gripper" and keep.any() else grasp
 
 
 def _grasp_of(recording: Recording, gripper: str, name: str, start: float) -> tuple[float, float, Array]:
