@@ -95,6 +95,23 @@ def test_when_a_load_was_put_down_lies_where_they_say_as_often_as_they_say(track
     assert within >= 5
 
 
+def test_they_come_to_both_ends_of_a_cord_s_ridge(track: Any, free: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A body that goes away from an anchor in one direction shows a pull, and hardly how long the cord is."""
+    scene = scene_of(track, free.rows(free.mean[None])[0])
+    tethered = free.with_effect(EFFECTS["tether"], scene, 0)
+    x, y, length, *at = (tethered.columns.index(f"tether_{name}") for name in ("x", "y", "length", "at_x", "at_y"))
+    first = track.seen[0, :2]
+    furthest = track.seen[np.argmax(np.hypot(*(track.seen[:, :2] - first).T)), :2]
+    truth, way = tethered.mean.copy(), (first - furthest) / np.hypot(*(first - furthest))
+    truth[[x, y]], truth[length], truth[at] = furthest + 0.9 * way, np.log(0.8), track.body[1:3]
+    peak = alone(climb(told(np.random.default_rng(3), track, tethered, truth[None]), truth[None], iterations=10))
+    drawn = evolved(np.random.default_rng(4), peak)[:, length]
+    monkeypatch.setattr("pbrl_mismatch.search.posterior.KEPT", 1500)
+    endless = evolved(np.random.default_rng(5), peak)[:, length]
+    assert drawn.std() == pytest.approx(endless.std(), rel=0.25)
+    assert endless.std() > 2.5 * np.sqrt(peak.covariance(0)[length, length])  # a Gaussian at the top does not know
+
+
 def test_same_seed_same_bytes_in_any_number_of_threads(track: Any, free: Any) -> None:
     peak = alone(climb(told(np.random.default_rng(3), track, free, free.mean[None]), free.mean[None], iterations=4))
     assert np.array_equal(evolved(np.random.default_rng(4), peak), evolved(np.random.default_rng(4), peak, workers=3))

@@ -4,6 +4,7 @@ When a load was put down may be all the same for a second, and a cord's anchor l
 deviations are those of the steepest place. Draws are by differential evolution (ter Braak 2006): each point of a
 population moves by the difference of two others, so that steps have the density's own shape. The population begins at
 Laplace's Gaussian, spreads in a flattened density, and is cooled; where that Gaussian is right, it is left as it is.
+Differences of points lie along straight ridges alone: that of a cord is made straight first (`search.cords`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_mismatch.search.climb import Peak
+from pbrl_mismatch.search.cords import bent, cords_of, log_volume, straightened
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import Hypothesis
@@ -31,6 +33,8 @@ LEAP, JITTER = 0.1, 1e-3
 """Share of moves by a whole difference, from mode to mode; noise of a move, in Laplace's deviations."""
 EVEN = 0.5
 """Where the log density less Laplace's, at its own draws, varies by less [nat], nothing is to be spread or cooled."""
+UNWOUND = 0.3
+"""The population begins with lengths of cords scattered by so much beyond Laplace, as logarithms."""
 SHORTEST = 0.4
 """The least that a difference is scaled by, over the best scale of a Gaussian."""
 
@@ -89,14 +93,20 @@ def _evolved(rng: np.random.Generator, peak: Peak, hypothesis: Hypothesis, densi
     size = len(hypothesis.spread)
     values, vectors = np.linalg.eigh(peak.covariance(0))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    jitter = JITTER * np.sqrt(np.sum(root**2, axis=1))
     normal = rng.standard_normal((POPULATION, size))
     drawn = peak.coordinates[0] + normal @ root.T
-    points = hypothesis.believable(drawn)
-    here = density(points)
-    gaussian = np.array_equal(points, drawn) and float(np.std(here + 0.5 * np.sum(normal**2, axis=1))) < EVEN
+    begun = hypothesis.believable(drawn)
+    here = density(begun)
+    gaussian = np.array_equal(begun, drawn) and float(np.std(here + 0.5 * np.sum(normal**2, axis=1))) < EVEN
     cooled = [] if gaussian else [*np.full(HOT, FLAT), *np.geomspace(FLAT, 1.0, COOLING)]
     cooled += [1.0] * KEPT
+    cords = cords_of(hypothesis, peak.coordinates[0], peak.objective.cuts.track)
+    points = straightened(cords, begun)
+    if not gaussian:
+        for cord in cords:
+            points[:, cord.length] += UNWOUND * rng.standard_normal(POPULATION)
+    here += log_volume(cords, points)
+    jitter = JITTER * points.std(axis=0)
     kept = np.empty((len(cooled), POPULATION, size))
     half = POPULATION // 2
     for generation, power in enumerate(cooled):
@@ -105,10 +115,11 @@ def _evolved(rng: np.random.Generator, peak: Peak, hypothesis: Hypothesis, densi
             scale = 2.38 / math.sqrt(2.0 * size) * rng.uniform(SHORTEST, 1.0, half)
             scale[rng.random(half) < LEAP] = 1.0
             trial = points[movers] + scale[:, None] * (first - second) + jitter * rng.standard_normal((half, size))
-            allowed = np.all(hypothesis.believable(trial) == trial, axis=1)
-            there = density(trial)
+            told = bent(cords, trial)
+            allowed = np.all(hypothesis.believable(told) == told, axis=1)
+            there = density(told) + log_volume(cords, trial)
             taken = allowed & (np.log(rng.random(half)) < power * (there - here[movers]))
             points[movers] = np.where(taken[:, None], trial, points[movers])
             here[movers] = np.where(taken, there, here[movers])
-        kept[generation] = points
+        kept[generation] = bent(cords, points)
     return kept[-KEPT:].reshape(-1, size)
