@@ -101,6 +101,9 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
     if short:
         names = " and ".join(best.effects)
         notes.append(f"nothing in the library reaches the noise floor: the likeliest, {names}, {short}")
+    if best.vetoed:
+        names = " and ".join(best.effects)
+        notes.append(f"{names} is not named: what was held out of the fit is predicted worse than by the baseline")
     if not bool(best.fitted.peak.settled[0]):
         notes.append(f"the fit of {' and '.join(best.effects)} had not settled: its numbers are rough")
     alike = [each for each in others[1:] if each.log_weight > best.log_weight - ALIKE]

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from pbrl_mismatch import EFFECTS, DiagnoseOptions
+from pbrl_mismatch.search.heldout import Score
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.weigh import CLEAR, DISCREPANCY, OF_EXACT, OF_HISTORY, weigh
+from pbrl_mismatch.search.weigh import ASTRAY, CLEAR, DISCREPANCY, OF_EXACT, OF_HISTORY, VETO, Weighed, veto, weigh
 
 OPTIONS = DiagnoseOptions()
 
@@ -27,6 +28,7 @@ def fitted(variant: str, evidence: float, unexplained: float = 0.0, beside: floa
         evidence=evidence,
         of_motion=evidence - beside,
         unexplained=unexplained,
+        score=None,
     )
 
 
@@ -142,3 +144,47 @@ def test_what_is_known_beside_the_motion_leaves_no_share_of_the_motion_to_others
     # A gain in the motion alone, where the first has explained a lot of it, is what a wrong law leaves to any other.
     found = weights(fitted(gives, 2000.0), fitted(hinge, -40.0), fitted(both.hypothesis.variant, 2025.0))
     assert max(found, key=lambda effects: found[effects]) == ("grasp_compliance",)
+
+
+@pytest.mark.parametrize(
+    ("log_score", "position", "vetoed"),
+    [
+        (-50.0, 0.01, False),
+        (-50.0, 0.99 * ASTRAY * 0.02, False),
+        (-50.0, 1.01 * ASTRAY * 0.02, True),
+        (-60.0 - VETO - 6.0, 0.01, True),
+        (-50.0, math.nan, False),
+    ],
+)
+def test_what_predicts_worse_than_nothing_does_is_not_named(log_score: float, position: float, vetoed: bool) -> None:
+    baseline = fitted("free", -200.0)
+    baseline.score = Score(-60.0, 0.02, 0.02, 0.01)
+    law, other = fitted("free + tether/0", -100.0), fitted("free + detent/0", -120.0)
+    weighed = tuple(
+        Weighed(each.hypothesis.effects, each, each.evidence, 0.5, False) for each in (law, other, baseline)
+    )
+
+    def judge(each: Any) -> Any:
+        each.score = Score(log_score, position, 0.02, 0.01) if each is law else baseline.score
+        return each
+
+    best = next(each for each in veto(weighed, baseline, judge) if each.effects == ("tether",))
+    assert best.vetoed == vetoed
+    assert best.log_weight == pytest.approx(-100.0 - max(-60.0 - log_score, 0.0))
+
+
+def test_a_set_that_goes_astray_leaves_the_name_to_its_part() -> None:
+    baseline = fitted("free", -200.0)
+    baseline.score = Score(-60.0, 0.02, 0.02, 0.01)
+    part, whole = fitted("free + tether/0", -110.0), fitted("free + tether/0 + wrench_bias/1", -100.0)
+    weighed = tuple(
+        Weighed(each.hypothesis.effects, each, each.evidence, 0.5, False) for each in (whole, part, baseline)
+    )
+
+    def judge(each: Any) -> Any:
+        each.score = Score(-50.0, 1.0 if each is whole else 0.01, 0.02, 0.01)
+        return each
+
+    found = veto(weighed, baseline, judge)
+    assert [each.effects for each in found] == [("tether",), (), ("tether", "wrench_bias")]
+    assert found[0].probability == pytest.approx(1.0) and not found[0].vetoed and found[2].vetoed

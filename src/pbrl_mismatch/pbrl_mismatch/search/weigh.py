@@ -17,6 +17,9 @@ from pbrl_mismatch.search.fitted import Fitted
 VETO, VETO_SHARE = 8.0, 0.05
 """A hypothesis that predicts held-out windows worse than the baseline by this much [nat], and this share of what its
 evidence gained, is not named."""
+ASTRAY = 5.0
+"""Nor is one whose forecasts of them are so many times as far off as the baseline's. Those of a right law are up to 3.4
+times as far off, where feet stick or a crate is met; a wrong one that the windows alone allow went astray tenfold."""
 DISCREPANCY, OF_HISTORY = 0.015, 0.04
 """Share of what a law explains that its being wrong may leave for others to explain; the same of contacts and of what
 moves besides the body: how a crate or a caster is turned follows from all that was before."""
@@ -27,8 +30,8 @@ CLEAR = 5.0
 tried, on laws that are all a little wrong."""
 REFINED = 0.01
 """Share of what a law explains that a law of which it is a limit has to explain beyond it."""
-JUDGED = 3
-"""So many of the likeliest are held against held-out windows at most."""
+JUDGED = 5
+"""So many are held against held-out windows at most, each as long as it is the likeliest."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +154,9 @@ def worth_of_another(weighed: Sequence[Weighed]) -> float:
 def veto(weighed: Sequence[Weighed], baseline: Fitted, judge: Callable[[Fitted], Fitted]) -> tuple[Weighed, ...]:
     """Return hypotheses with the likeliest held against what was held out of their fit.
 
-    One that predicts it worse than the baseline loses what it predicts worse.
+    One that predicts it worse than the baseline loses what it predicts worse. What windows that are fitted to their
+    starts allow may still forecast nothing: where a patch begins that the rest does not show. Several effects together
+    that predict so badly are no rivals of one of them that does not.
 
     Args:
         weighed: hypotheses, likeliest first.
@@ -159,15 +164,18 @@ def veto(weighed: Sequence[Weighed], baseline: Fitted, judge: Callable[[Fitted],
         judge: gives a fitted hypothesis its score.
     """
     found = list(weighed)
-    for rank, best in enumerate(weighed[:JUDGED]):
-        if not best.effects or baseline.score is None:
+    for _ in range(JUDGED):
+        rank = max(range(len(found)), key=lambda k: found[k].log_weight)
+        best = found[rank]
+        if not best.effects or best.fitted.score is not None or baseline.score is None:
             break
         fitted = judge(best.fitted)
         short = baseline.score.log_score - fitted.score.log_score if fitted.score else 0.0
-        vetoed = short > VETO + VETO_SHARE * max(fitted.evidence - baseline.evidence, 0.0)
-        found[rank] = replace(best, fitted=fitted, vetoed=vetoed, log_weight=best.log_weight - max(short, 0.0))
-        if not vetoed:
-            break
+        vetoed = short > VETO + VETO_SHARE * max(fitted.evidence - baseline.evidence, 0.0) or (
+            fitted.score is not None and fitted.score.rmse_position > ASTRAY * baseline.score.rmse_position
+        )
+        weight = -math.inf if vetoed and len(best.effects) > 1 else best.log_weight - max(short, 0.0)
+        found[rank] = replace(best, fitted=fitted, vetoed=vetoed, log_weight=weight)
     return _ordered(found)
 
 

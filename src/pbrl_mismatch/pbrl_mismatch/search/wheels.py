@@ -23,8 +23,8 @@ from pbrl_mismatch.search.path.splits import with_splits
 
 Array = NDArray[np.float64]
 
-STARTS, STEPS = 10, 5
-"""So many places of the wheel are climbed from, in so many steps."""
+PARTED, PINNED, STEPS = 30, 10, 5
+"""From so many partings of a wheel is climbed, and from so many places of one beside a pin, in so many steps."""
 KEPT = 3
 """So many of them go on."""
 BY_CHANCE = 2.5
@@ -53,7 +53,7 @@ def parted_starts(
     columns = hypothesis.columns
     if base.noise_scale < 1.0 + BY_CHANCE / math.sqrt(2.0 * base.peak.objective.observations):
         return np.empty((0, len(columns)))
-    draws = hypothesis.laid_on(base.hypothesis, base.peak.coordinates[0], hypothesis.sample_prior(rng, STARTS))
+    draws = hypothesis.laid_on(base.hypothesis, base.peak.coordinates[0], hypothesis.sample_prior(rng, PARTED))
     draws = with_splits(rng, draws, columns, scene_of(shortest.track, base.row).size)
     return _climbed(hypothesis, draws, shortest, options)
 
@@ -78,7 +78,7 @@ def pinned_starts(
         options: settings.
     """
     columns, pins = hypothesis.columns, EFFECTS[hypothesis.effects[-1]].pins
-    draws = hypothesis.sample_felt(rng, STARTS)
+    draws = hypothesis.sample_felt(rng, PINNED)
     fitted = hypothesis.laid_on(base.hypothesis, base.peak.coordinates[0], draws)
     draws = np.where(np.isin(columns, [*OF_THE_BODY, *BELIEVED]), draws, fitted)
     if pins is not None:
