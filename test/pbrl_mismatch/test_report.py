@@ -57,7 +57,7 @@ def test_every_place_s_middle_is_where_its_outline_is() -> None:
 def test_of_two_effects_the_one_that_explains_more_alone_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(report, "_described", lambda each, scene: each.effects)
     peak = SimpleNamespace(settled=[True])
-    fits: Any = SimpleNamespace(usual_scale=1.0, peak=peak)
+    fits: Any = SimpleNamespace(usual_scale=1.0, peak=peak, unexplained=0.0)
     weights = {("hidden_obstacle", "unseen_body"): 0.0, ("unseen_body",): -9.0, ("hidden_obstacle",): -20.0, (): -50.0}
     weighed = tuple(Weighed(names, fits, value, float(value == 0.0), False) for names, value in weights.items())
     found = findings_of(fits, weighed, fits, exact=True)
@@ -66,22 +66,25 @@ def test_of_two_effects_the_one_that_explains_more_alone_comes_first(monkeypatch
 
 
 @pytest.mark.parametrize(
-    ("names", "exact", "p_value", "named"),
+    ("names", "exact", "p_value", "left", "named"),
     [
-        (("wrench_bias",), True, 1e-9, False),
-        (("wrench_bias",), True, 1e-3, True),
-        (("wrench_bias",), False, 1e-9, True),  # a told baseline's casters are an idealisation
-        (("wrench_bias", "unseen_body"), True, 1e-9, True),  # so is a contact
+        (("wrench_bias",), True, 1e-9, 0.0, False),
+        (("wrench_bias",), True, 1e-3, 0.5, True),
+        (("wrench_bias",), False, 1e-9, 0.5, True),  # a told baseline's casters are an idealisation
+        (("wrench_bias", "unseen_body"), True, 1e-9, 0.2, True),  # so is a contact
+        (("wrench_bias", "unseen_body"), True, 1e-9, 0.5, False),  # that leaves half is another thing
+        (("unseen_body",), True, 1e-3, 0.5, True),
     ],
 )
-def test_an_exact_law_that_leaves_a_wrench_is_not_named(
-    monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], exact: bool, p_value: float, named: bool
+def test_a_law_that_leaves_a_wrench_is_not_named_if_it_is_exact_or_the_wrench_large(
+    monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], exact: bool, p_value: float, left: float, named: bool
 ) -> None:
     monkeypatch.setattr(report, "_described", lambda each, scene: each.effects)
     monkeypatch.setattr(report, "predictive_test", lambda peak, row: SimpleNamespace(p_value=p_value))
-    fits: Any = SimpleNamespace(usual_scale=1.0, peak=SimpleNamespace(settled=[True]))
-    weighed = (Weighed(names, fits, 0.0, 1.0, False), Weighed((), fits, -50.0, 0.0, False))
-    found = findings_of(fits, weighed, fits, exact=exact)
+    fits: Any = SimpleNamespace(usual_scale=1.0, peak=SimpleNamespace(settled=[True]), unexplained=100.0 * left)
+    none: Any = SimpleNamespace(usual_scale=1.0, unexplained=100.0)
+    weighed = (Weighed(names, fits, 0.0, 1.0, False), Weighed((), none, -50.0, 0.0, False))
+    found = findings_of(none, weighed, fits, exact=exact)
     assert found.effects == (names if named else ())
     assert found.alternatives == (() if named else names)
     assert any("leaves a wrench" in note for note in found.notes) != named
