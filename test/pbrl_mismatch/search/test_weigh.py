@@ -173,18 +173,30 @@ def test_what_predicts_worse_than_nothing_does_is_not_named(log_score: float, po
     assert best.log_weight == pytest.approx(-100.0 - max(-60.0 - log_score, 0.0))
 
 
-def test_a_set_that_goes_astray_leaves_the_name_to_its_part() -> None:
+@pytest.mark.parametrize(
+    ("log_score", "position", "stands"),
+    [
+        (-50.0, 1.0, False),  # astray
+        (-70.0 - VETO, 0.01, False),
+        (-50.1, 0.011, False),  # a little worse than its part in both
+        (-49.9, 0.011, True),
+        (-50.1, 0.009, True),
+    ],
+)
+def test_a_set_that_predicts_worse_than_its_part_leaves_it_the_name(
+    log_score: float, position: float, stands: bool
+) -> None:
     baseline = fitted("free", -200.0)
     baseline.score = Score(-60.0, 0.02, 0.02, 0.01)
     part, whole = fitted("free + tether/0", -110.0), fitted("free + tether/0 + wrench_bias/1", -100.0)
-    weighed = tuple(
-        Weighed(each.hypothesis.effects, each, each.evidence, 0.5, False) for each in (whole, part, baseline)
-    )
+    hypotheses = (whole, part, baseline)
+    weighed = tuple(Weighed(each.hypothesis.effects, each, each.evidence, 0.5, False) for each in hypotheses)
 
     def judge(each: Any) -> Any:
-        each.score = Score(-50.0, 1.0 if each is whole else 0.01, 0.02, 0.01)
+        each.score = Score(log_score, position, 0.02, 0.01) if each is whole else Score(-50.0, 0.01, 0.02, 0.01)
         return each
 
+    names = [("tether", "wrench_bias"), ("tether",), ()]
     found = veto(weighed, baseline, judge)
-    assert [each.effects for each in found] == [("tether",), (), ("tether", "wrench_bias")]
-    assert found[0].probability == pytest.approx(1.0) and not found[0].vetoed and found[2].vetoed
+    assert [each.effects for each in found] == (names if stands else [names[1], names[2], names[0]])
+    assert found[0].probability == pytest.approx(1.0, abs=1e-4) and not found[0].vetoed

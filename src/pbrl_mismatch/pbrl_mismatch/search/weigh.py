@@ -156,7 +156,7 @@ def veto(weighed: Sequence[Weighed], baseline: Fitted, judge: Callable[[Fitted],
 
     One that predicts it worse than the baseline loses what it predicts worse. What windows that are fitted to their
     starts allow may still forecast nothing: where a patch begins that the rest does not show. Several effects together
-    that predict so badly are no rivals of one of them that does not.
+    that predict so badly, or worse than one of them does, are no rivals of that one.
 
     Args:
         weighed: hypotheses, likeliest first.
@@ -166,17 +166,37 @@ def veto(weighed: Sequence[Weighed], baseline: Fitted, judge: Callable[[Fitted],
     found = list(weighed)
     for _ in range(JUDGED):
         rank = max(range(len(found)), key=lambda k: found[k].log_weight)
-        best = found[rank]
-        if not best.effects or best.fitted.score is not None or baseline.score is None:
+        if not found[rank].effects or found[rank].fitted.score is not None or baseline.score is None:
             break
-        fitted = judge(best.fitted)
-        short = baseline.score.log_score - fitted.score.log_score if fitted.score else 0.0
-        vetoed = short > VETO + VETO_SHARE * max(fitted.evidence - baseline.evidence, 0.0) or (
-            fitted.score is not None and fitted.score.rmse_position > ASTRAY * baseline.score.rmse_position
-        )
-        weight = -math.inf if vetoed and len(best.effects) > 1 else best.log_weight - max(short, 0.0)
-        found[rank] = replace(best, fitted=fitted, vetoed=vetoed, log_weight=weight)
+        best = found[rank] = _held_against(found[rank], baseline, judge)
+        parts = [k for k, each in enumerate(found) if each.effects and set(each.effects) < set(best.effects)]
+        if not parts:
+            continue
+        part = max(parts, key=lambda k: found[k].log_weight)
+        if found[part].fitted.score is None:
+            found[part] = _held_against(found[part], baseline, judge)
+        if best.vetoed or _predicts_worse(best.fitted, found[part].fitted):
+            found[rank] = replace(best, vetoed=True, log_weight=-math.inf)
     return _ordered(found)
+
+
+def _held_against(weighed: Weighed, baseline: Fitted, judge: Callable[[Fitted], Fitted]) -> Weighed:
+    """Return a hypothesis that is judged, less what it predicts worse than the baseline."""
+    fitted = judge(weighed.fitted)
+    if fitted.score is None or baseline.score is None:
+        return replace(weighed, fitted=fitted)
+    short = baseline.score.log_score - fitted.score.log_score
+    vetoed = short > VETO + VETO_SHARE * max(fitted.evidence - baseline.evidence, 0.0)
+    vetoed |= fitted.score.rmse_position > ASTRAY * baseline.score.rmse_position
+    return replace(weighed, fitted=fitted, vetoed=vetoed, log_weight=weighed.log_weight - max(short, 0.0))
+
+
+def _predicts_worse(whole: Fitted, part: Fitted) -> bool:
+    """Tell whether several effects predict what was held out worse than one of them: its windows, and as a forecast."""
+    if whole.score is None or part.score is None:
+        return False
+    farther = whole.score.rmse_position > part.score.rmse_position
+    return farther and whole.score.log_score < part.score.log_score
 
 
 def _ordered(entries: Sequence[Weighed]) -> tuple[Weighed, ...]:
