@@ -102,10 +102,11 @@ def _evolved(rng: np.random.Generator, peak: Peak, hypothesis: Hypothesis, densi
     cooled += [1.0] * KEPT
     cords = cords_of(hypothesis, peak.coordinates[0], peak.objective.cuts.track)
     points = straightened(cords, begun)
-    if not gaussian:
-        for cord in cords:
-            points[:, cord.length] += UNWOUND * rng.standard_normal(POPULATION)
-    here += log_volume(cords, points)
+    if cords and not gaussian:
+        points[:, [cord.length for cord in cords]] += UNWOUND * rng.standard_normal((POPULATION, len(cords)))
+        begun = hypothesis.believable(bent(cords, points))
+        points, here = straightened(cords, begun), density(begun)
+    here = here + log_volume(cords, points)
     jitter = JITTER * points.std(axis=0)
     kept = np.empty((len(cooled), POPULATION, size))
     half = POPULATION // 2
