@@ -100,16 +100,15 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
     if not others:
         return Findings((), (), (NOTHING_TRIED,) if weighed else ())
     best, notes = others[0], []
+    names = " and ".join(best.effects)
     short = _falls_short(best, baseline, exact=exact)
     named = bool(weighed[0].effects) and best.probability >= NAMED and not short and not best.vetoed
     if short:
-        names = " and ".join(best.effects)
         notes.append(f"nothing in the library reaches the noise floor: the likeliest, {names}, {short}")
     if best.vetoed:
-        names = " and ".join(best.effects)
         notes.append(f"{names} is not named: what was held out of the fit is predicted worse than by the baseline")
     if not bool(best.fitted.peak.settled[0]):
-        notes.append(f"the fit of {' and '.join(best.effects)} had not settled: its numbers are rough")
+        notes.append(f"the fit of {names} had not settled: its numbers are rough")
     alike = [each for each in others[1:] if each.log_weight > best.log_weight - ALIKE]
     if alike:
         notes.append(f"{' and '.join(' + '.join(e.effects) for e in (best, *alike))} explain this recording alike")

@@ -94,7 +94,7 @@ def bent(cords: Sequence[Cord], straight: Array) -> Array:
 def log_volume(cords: Sequence[Cord], straight: Array) -> Array:
     """Return the log of the volume (n,) of a unit of volume at straightened points (n, K); -inf: there is none."""
     out = np.zeros(len(straight))
-    for cord in cords:
-        distance = cord.distance(straight)
-        out += np.log(np.maximum(distance, 0.0), where=distance > 0.0, out=np.full(len(out), -np.inf))
+    with np.errstate(divide="ignore"):
+        for cord in cords:
+            out += np.log(np.maximum(cord.distance(straight), 0.0))
     return out

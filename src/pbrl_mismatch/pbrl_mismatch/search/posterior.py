@@ -10,7 +10,7 @@ Differences of points lie along straight ridges alone: that of a cord is made st
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_mismatch.search.climb import Peak
-from pbrl_mismatch.search.cords import bent, cords_of, log_volume, straightened
+from pbrl_mismatch.search.cords import Cord, bent, cords_of, log_volume, straightened
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import Hypothesis
@@ -90,26 +90,13 @@ def evolved(rng: np.random.Generator, peak: Peak, workers: int = 1) -> Array:
 
 
 def _evolved(rng: np.random.Generator, peak: Peak, hypothesis: Hypothesis, density: Callable[[Array], Array]) -> Array:
-    size = len(hypothesis.spread)
-    values, vectors = np.linalg.eigh(peak.covariance(0))
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    normal = rng.standard_normal((POPULATION, size))
-    drawn = peak.coordinates[0] + normal @ root.T
-    begun = hypothesis.believable(drawn)
-    here = density(begun)
-    gaussian = np.array_equal(begun, drawn) and float(np.std(here + 0.5 * np.sum(normal**2, axis=1))) < EVEN
+    cords = cords_of(hypothesis, peak.coordinates[0], peak.objective.cuts.track)
+    size, half = len(hypothesis.spread), POPULATION // 2
+    points, here, gaussian = _begun(rng, peak, hypothesis, density, cords)
     cooled = [] if gaussian else [*np.full(HOT, FLAT), *np.geomspace(FLAT, 1.0, COOLING)]
     cooled += [1.0] * KEPT
-    cords = cords_of(hypothesis, peak.coordinates[0], peak.objective.cuts.track)
-    points = straightened(cords, begun)
-    if cords and not gaussian:
-        points[:, [cord.length for cord in cords]] += UNWOUND * rng.standard_normal((POPULATION, len(cords)))
-        begun = hypothesis.believable(bent(cords, points))
-        points, here = straightened(cords, begun), density(begun)
-    here = here + log_volume(cords, points)
     jitter = JITTER * points.std(axis=0)
     kept = np.empty((len(cooled), POPULATION, size))
-    half = POPULATION // 2
     for generation, power in enumerate(cooled):
         for movers, others in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
             first, second = points[others][rng.integers(0, half, (2, half))]
@@ -124,3 +111,25 @@ def _evolved(rng: np.random.Generator, peak: Peak, hypothesis: Hypothesis, densi
             here[movers] = np.where(taken, there, here[movers])
         kept[generation] = bent(cords, points)
     return kept[-KEPT:].reshape(-1, size)
+
+
+def _begun(
+    rng: np.random.Generator,
+    peak: Peak,
+    hypothesis: Hypothesis,
+    density: Callable[[Array], Array],
+    cords: Sequence[Cord],
+) -> tuple[Array, Array, bool]:
+    """Return a population, straightened, with its log density there, and whether Laplace's Gaussian is right."""
+    values, vectors = np.linalg.eigh(peak.covariance(0))
+    normal = rng.standard_normal((POPULATION, len(values)))
+    drawn = peak.coordinates[0] + normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    told = hypothesis.believable(drawn)
+    here = density(told)
+    gaussian = np.array_equal(told, drawn) and float(np.std(here + 0.5 * np.sum(normal**2, axis=1))) < EVEN
+    points = straightened(cords, told)
+    if cords and not gaussian:
+        points[:, [cord.length for cord in cords]] += UNWOUND * rng.standard_normal((POPULATION, len(cords)))
+        told = hypothesis.believable(bent(cords, points))
+        points, here = straightened(cords, told), density(told)
+    return points, here + log_volume(cords, points), gaussian
