@@ -112,6 +112,33 @@ def test_they_come_to_both_ends_of_a_cord_s_ridge(track: Any, free: Any, monkeyp
     assert endless.std() > 2.5 * np.sqrt(peak.covariance(0)[length, length])  # a Gaussian at the top does not know
 
 
+def test_their_deviations_are_the_density_s_where_that_is_wide_and_has_a_side_peak(
+    track: Any, free: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In fifteen coordinates sixty generations do not cool by moves alone, nor do these lead out of a side peak."""
+    scene = scene_of(track, free.rows(free.mean[None])[0])
+    rolling = free.with_effect(EFFECTS["caster_swivel"], scene, 0).with_effect(EFFECTS["payload_change"], scene, 0)
+    peak = alone(climb(told(np.random.default_rng(6), track, rolling, rolling.mean[None]), rolling.mean[None]))
+    at, top, laplace = rolling.columns.index("payload_time"), peak.coordinates[0], peak.covariance(0)
+    wide = np.full(len(top), 1.6)
+    wide[at] = 0.05  # of a load that was put down while nothing moved, the top's own curvature says nothing
+    whiten = np.linalg.cholesky(np.linalg.inv(laplace))
+
+    def density(points: np.ndarray) -> np.ndarray:
+        away = (points - top) @ whiten
+        aside = (points[:, at] - top[at]) / np.sqrt(laplace[at, at])
+        return -0.5 * np.sum((away / 1.6) ** 2, axis=1) + np.logaddexp(
+            -0.5 * (aside / wide[at]) ** 2, -200.0 - 0.5 * ((aside - 1.0) / 0.3) ** 2
+        )
+
+    monkeypatch.setattr("pbrl_mismatch.search.posterior.Density", lambda _: density)
+    monkeypatch.setattr(type(rolling), "believable", lambda self, points: points)
+    drawn = evolved(np.random.default_rng(7), peak)
+    assert len(top) > 12
+    assert density(drawn).min() > -100.0
+    assert -np.mean(density(drawn)) == pytest.approx(0.5 * len(top), rel=0.25)
+
+
 def test_same_seed_same_bytes_in_any_number_of_threads(track: Any, free: Any) -> None:
     peak = alone(climb(told(np.random.default_rng(3), track, free, free.mean[None]), free.mean[None], iterations=4))
     assert np.array_equal(evolved(np.random.default_rng(4), peak), evolved(np.random.default_rng(4), peak, workers=3))

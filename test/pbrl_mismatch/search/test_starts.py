@@ -17,6 +17,7 @@ from pbrl_mismatch.effects.effect import Scene
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.search.fitted import cut_stages, fit_from
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
+from pbrl_mismatch.search.path.climb import climb_along
 from pbrl_mismatch.search.path.ground import ground_of
 from pbrl_mismatch.search.path.starts import ELSEWHERE, ELSEWHERE_ON_IT, each_first, going_on, starts_of
 
@@ -50,6 +51,27 @@ def test_the_moment_that_a_sensor_s_offset_comes_is_found(clean: Any, share: flo
     assert told["bias_start"] == pytest.approx(since, abs=0.25)
     assert [told["bias_x"], told["bias_y"]] == pytest.approx(BIAS[:2].tolist(), abs=0.4)
     assert found.noise_scale < 1.1
+
+
+@pytest.mark.parametrize(
+    ("name", "variant", "seed"), [("payload_change", 0, 3), ("payload_change", 1, 1), ("external_force", 1, 3)]
+)
+def test_at_no_other_moment_is_it_likelier(
+    concealed_recording: Callable[..., Recording], name: str, variant: int, seed: int
+) -> None:
+    """Not felt while nothing changes, a load has many tops over its moment, and few draws meet the highest."""
+    track = track_of(concealed_recording(name, seed), "table")
+    free = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.02), ["free"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    base = fit_from(free, cut_stages(track, OPTIONS), free.mean[None], OPTIONS)
+    ground = ground_of(free, base.peak.coordinates[0], cut_windows(track, 2.0), OPTIONS.sensor_floor)
+    for draws in range(3):
+        found = starts_of(np.random.default_rng(draws), name, variant, base, ground, OPTIONS)
+        columns, best = found.hypothesis.columns, found.coordinates[:1]
+        for moment in EFFECTS[name].moments:
+            others = best.repeat(40, axis=0)
+            others[:, columns.index(moment)] = np.linspace(*track.clock[[0, -1]], 40)
+            elsewhen = climb_along(ground.climbed, found.hypothesis, others, 8)
+            assert elsewhen.evidence.max() < found.evidence[0] + 1.0
 
 
 @pytest.mark.parametrize(("name", "variant", "beside"), [("detent", 1, 1), ("floor_patch", 0, 1), ("tether", 0, 0)])

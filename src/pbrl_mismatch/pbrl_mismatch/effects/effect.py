@@ -134,6 +134,7 @@ class Effect:
         rhythm: columns of a frequency and of its phase.
         region: columns of a rectangle on the floor in which feet are held: x, y, half of length and width, and angle.
         pins: columns x and y of a place about which the body can only turn.
+        moments: columns of the times at which it comes or goes.
         lasts: columns of the moment from which it is there, whether it is felt or not, and of what is 1 where it was
             there until then.
         remembers: whether more moves than the body, so that its past matters.
@@ -163,6 +164,7 @@ class Effect:
     rhythm: tuple[str, str] | None = None
     region: tuple[str, str, str, str, str] | None = None
     pins: tuple[str, str] | None = None
+    moments: tuple[str, ...] = ()
     lasts: tuple[str, str] | None = None
     remembers: bool = False
     second: bool = False

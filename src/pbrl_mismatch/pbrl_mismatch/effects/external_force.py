@@ -59,6 +59,7 @@ EFFECT = Effect(
     ),
     direction="world",
     angles=("periodic_phase",),
+    moments=("force_start", "force_end"),
     rhythm=("periodic_frequency", "periodic_phase"),
     linear=("steady_x", "steady_y", "steady_torque", "periodic_x", "periodic_y", "periodic_torque"),
     exact=True,

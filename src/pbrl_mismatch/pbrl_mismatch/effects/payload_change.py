@@ -44,6 +44,7 @@ EFFECT = Effect(
     where=where,
     place=("payload_x", "payload_y"),
     direction="acceleration",
+    moments=("payload_time",),
     lasts=("payload_time", "payload_gone"),
     linear=("payload_mass",),
     exact=True,

@@ -43,6 +43,7 @@ EFFECT = Effect(
         ),
     ),
     direction="gripper",
+    moments=("bias_start",),
     linear=("bias_x", "bias_y", "bias_torque", "drift_x", "drift_y", "drift_torque"),
     exact=True,
 )

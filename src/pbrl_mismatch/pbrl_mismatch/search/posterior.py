@@ -4,6 +4,8 @@ When a load was put down may be all the same for a second, and a cord's anchor l
 deviations are those of the steepest place. Draws are by differential evolution (ter Braak 2006): each point of a
 population moves by the difference of two others, so that steps have the density's own shape. The population begins at
 Laplace's Gaussian, spreads in a flattened density, and is cooled; where that Gaussian is right, it is left as it is.
+Some end in a side peak that moves do not lead out of, hundreds of nats down: while it is cooled the population is drawn
+anew by the density's own growth (population annealing, Hukushima and Iba 2003).
 Differences of points lie along straight ridges alone: that of a cord is made straight first (`search.cords`).
 """
 
@@ -22,6 +24,7 @@ from pbrl_mismatch.search.cords import Cord, bent, cords_of, log_volume, straigh
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import Hypothesis
+from pbrl_model.inference.cloud import no_nan, systematic
 
 Array = NDArray[np.float64]
 
@@ -97,7 +100,11 @@ def _evolved(rng: np.random.Generator, peak: Peak, hypothesis: Hypothesis, densi
     cooled += [1.0] * KEPT
     jitter = JITTER * points.std(axis=0)
     kept = np.empty((len(cooled), POPULATION, size))
+    before = cooled[0]
     for generation, power in enumerate(cooled):
+        if power > before:
+            rows = systematic(rng, np.exp((power - before) * (here - here.max())), POPULATION)
+            points, here, before = points[rows], here[rows], power
         for movers, others in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
             first, second = points[others][rng.integers(0, half, (2, half))]
             scale = 2.38 / math.sqrt(2.0 * size) * rng.uniform(SHORTEST, 1.0, half)
@@ -132,4 +139,4 @@ def _begun(
         points[:, [cord.length for cord in cords]] += UNWOUND * rng.standard_normal((POPULATION, len(cords)))
         told = hypothesis.believable(bent(cords, points))
         points, here = straightened(cords, told), density(told)
-    return points, here + log_volume(cords, points), gaussian
+    return points, no_nan(here + log_volume(cords, points)), gaussian

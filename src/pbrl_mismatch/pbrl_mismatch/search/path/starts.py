@@ -18,6 +18,7 @@ from pbrl_mismatch.search.hypothesis import BENT, OF_FRICTION, Hypothesis
 from pbrl_mismatch.search.path.climb import PathPeak, climb_along
 from pbrl_mismatch.search.path.contacts import contact_points, with_contacts
 from pbrl_mismatch.search.path.ground import Ground
+from pbrl_mismatch.search.path.moments import at_moments
 from pbrl_mismatch.search.path.pins import with_pins
 from pbrl_mismatch.search.path.pulls import with_pulls
 from pbrl_mismatch.search.path.regions import tile_friction, with_regions
@@ -83,7 +84,14 @@ def starts_of(
     found = climb_along(ground.climbed, hypothesis, kept, CLIMBED)
     # At the top a misfit says what a place is worth: of those that were gone on with beside the best, one more is left.
     most = options.keep[0] + int(len(kept) > options.keep[0])
-    return found.take(np.argsort(-found.evidence, kind="stable")[:most])
+    found = found.take(np.argsort(-found.evidence, kind="stable")[:most])
+    moments = [hypothesis.columns.index(column) for column in effect.moments if column in hypothesis.columns]
+    for moment in moments * len(moments):  # of two, each is sought again with the other where that was found
+        elsewhen = at_moments(found.coordinates, moment, ground.cuts.track.clock)
+        found = climb_along(ground.climbed, hypothesis, elsewhen, CLIMBED)
+        found = found.take(np.argsort(-found.evidence, kind="stable"))
+        found = found.take(apart_rows(found.coordinates, hypothesis.spread, most))
+    return found
 
 
 def _is_catch(effect: Effect) -> bool:
