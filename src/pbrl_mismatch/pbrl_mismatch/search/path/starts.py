@@ -88,10 +88,15 @@ def starts_of(
     moments = [hypothesis.columns.index(column) for column in effect.moments if column in hypothesis.columns]
     for moment in moments * len(moments):  # of two, each is sought again with the other where that was found
         elsewhen = at_moments(found.coordinates, moment, ground.cuts.track.clock)
-        found = climb_along(ground.climbed, hypothesis, elsewhen, CLIMBED)
-        found = found.take(np.argsort(-found.evidence, kind="stable"))
-        found = found.take(apart_rows(found.coordinates, hypothesis.spread, most))
+        begun = _likeliest(climb_along(ground.climbed, hypothesis, elsewhen, BEGUN), options.candidates)
+        found = _likeliest(climb_along(ground.climbed, hypothesis, begun.coordinates, CLIMBED), most)
     return found
+
+
+def _likeliest(found: PathPeak, count: int) -> PathPeak:
+    """Return so many of the likeliest points that are apart."""
+    ranked = found.take(np.argsort(-found.evidence, kind="stable"))
+    return ranked.take(apart_rows(ranked.coordinates, found.hypothesis.spread, count))
 
 
 def _is_catch(effect: Effect) -> bool:
