@@ -25,9 +25,9 @@ DISCREPANCY, OF_HISTORY = 0.015, 0.04
 moves besides the body: how a crate or a caster is turned follows from all that was before."""
 OF_EXACT = 0.01
 """The same of laws that are exact, for what the smoothed path and the sensor's own error leave."""
-CLEAR = 5.0
-"""One effect more has to be likelier by more [nat], very strong evidence (Kass and Raftery 1995): some twenty are
-tried, on laws that are all a little wrong."""
+CLEAR = 3.0
+"""One effect more has to be likelier, after its prior, by more than this [nat], twenty times: where the law that it joins
+is right nothing is, in more than one recording in twenty (Markov's inequality)."""
 REFINED = 0.01
 """Share of what a law explains that a law of which it is a limit has to explain beyond it."""
 JUDGED = 5
