@@ -65,6 +65,16 @@ def test_of_two_effects_the_one_that_explains_more_alone_comes_first(monkeypatch
     assert found.alternatives == ("unseen_body", "hidden_obstacle")
 
 
+def test_one_effect_is_named_where_only_what_is_beside_it_is_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(report, "_described", lambda each, scene: ((each.effects, each.probability),))
+    fits: Any = SimpleNamespace(usual_scale=1.0, peak=SimpleNamespace(settled=[True]), unexplained=0.0)
+    shares = {("tether",): 0.45, ("com_offset", "tether"): 0.35, ("tether", "wrench_bias"): 0.15, (): 0.05}
+    weighed = tuple(Weighed(names, fits, np.log(share), share, False) for names, share in shares.items())
+    found = findings_of(fits, weighed, fits, exact=False)
+    assert found.effects == ((("tether",), pytest.approx(0.95)),)
+    assert [names for names, _ in found.alternatives] == [("tether", "com_offset"), ("tether", "wrench_bias")]
+
+
 @pytest.mark.parametrize(
     ("names", "exact", "p_value", "left", "named"),
     [

@@ -17,12 +17,10 @@ from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.predictive import Verdict, predictive_test
-from pbrl_mismatch.search.weigh import Weighed
+from pbrl_mismatch.search.weigh import NAMED, Weighed, held_by
 
 Array = NDArray[np.float64]
 
-NAMED = 0.5
-"""An effect is named where it is at least so probable; otherwise it is an alternative."""
 EXPLAINED = 1.35
 """A hypothesis that needs a larger scale of the noise than this has not reached the noise floor."""
 NOTHING_TRIED = "nothing that the library was left with can be laid on this body: leave it more (option `without`)"
@@ -49,7 +47,7 @@ class Finding:
 
     Attributes:
         effect: its name.
-        probability: of the hypothesis.
+        probability: of the hypothesis; of what is named, that it is there, whatever is beside it.
         parameters: mean, sd and unit by name.
         where: frame, outline and the ellipse that holds its middle with 95 % by Laplace, or None.
         when: intervals [s], or None.
@@ -102,7 +100,8 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
     best, notes = others[0], []
     names = " and ".join(best.effects)
     short = _falls_short(best, baseline, exact=exact)
-    named = bool(weighed[0].effects) and best.probability >= NAMED and not short and not best.vetoed
+    sure = held_by(weighed, best.effects)
+    named = bool(weighed[0].effects) and sure >= NAMED and not short and not best.vetoed
     if short:
         notes.append(f"nothing in the library reaches the noise floor: the likeliest, {names}, {short}")
     if best.vetoed:
@@ -112,7 +111,7 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
     alike = [each for each in others[1:] if each.log_weight > best.log_weight - ALIKE]
     if alike:
         notes.append(f"{' and '.join(' + '.join(e.effects) for e in (best, *alike))} explain this recording alike")
-    chosen = _described(best, scene) if named else ()
+    chosen = _described(replace(best, probability=sure), scene) if named else ()
     rest = others[1:] if named else others
     alternatives = tuple(finding for each in rest[:SHOWN] for finding in _described(each, scene))
     return Findings(chosen, alternatives, tuple(notes))

@@ -12,7 +12,19 @@ import pytest
 from pbrl_mismatch import EFFECTS, DiagnoseOptions
 from pbrl_mismatch.search.heldout import Score
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.weigh import ASTRAY, CLEAR, DISCREPANCY, OF_EXACT, OF_HISTORY, VETO, Weighed, veto, weigh
+from pbrl_mismatch.search.weigh import (
+    ASTRAY,
+    CLEAR,
+    DISCREPANCY,
+    OF_EXACT,
+    OF_HISTORY,
+    VETO,
+    Weighed,
+    held_by,
+    sure_first,
+    veto,
+    weigh,
+)
 
 OPTIONS = DiagnoseOptions()
 
@@ -200,3 +212,34 @@ def test_a_set_that_predicts_worse_than_its_part_leaves_it_the_name(
     found = veto(weighed, baseline, judge)
     assert [each.effects for each in found] == (names if stands else [names[1], names[2], names[0]])
     assert found[0].probability == pytest.approx(1.0, abs=1e-4) and not found[0].vetoed
+
+
+@pytest.mark.parametrize(
+    ("shares", "first"),
+    [
+        ({("tether",): 0.49, ("com_offset", "tether"): 0.48, (): 0.03}, ("tether",)),
+        ({("com_offset", "tether"): 0.48, ("tether",): 0.45, ("com_offset",): 0.04, (): 0.03}, ("tether",)),
+        ({("com_offset", "tether"): 0.6, ("tether",): 0.4}, ("com_offset", "tether")),
+        ({("com_offset", "tether"): 0.4, ("detent",): 0.35, (): 0.2, ("tether",): 0.05}, ("com_offset", "tether")),
+        ({(): 0.9, ("tether",): 0.1}, ()),
+    ],
+)
+def test_of_what_is_certain_to_be_there_the_most_is_named(
+    shares: dict[tuple[str, ...], float], first: tuple[str, ...]
+) -> None:
+    fits: Any = None
+    weighed = tuple(Weighed(names, fits, math.log(share), share, False) for names, share in shares.items())
+    ordered = sure_first(weighed)
+    assert ordered[0].effects == first
+    assert sorted(each.effects for each in ordered) == sorted(shares)
+    rest = [each.log_weight for each in ordered[1:]]
+    assert rest == sorted(rest, reverse=True)
+
+
+def test_that_an_effect_is_there_is_as_probable_as_all_that_hold_it_together() -> None:
+    fits: Any = None
+    shares = {("com_offset", "tether"): 0.4, ("detent", "tether"): 0.2, ("detent",): 0.1, (): 0.3}
+    weighed = tuple(Weighed(names, fits, math.log(share), share, False) for names, share in shares.items())
+    assert held_by(weighed, ["tether"]) == pytest.approx(0.6)
+    assert held_by(weighed, ["tether", "detent"]) == pytest.approx(0.2)
+    assert held_by(weighed, []) == pytest.approx(1.0)

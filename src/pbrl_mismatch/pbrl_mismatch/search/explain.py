@@ -28,7 +28,7 @@ from pbrl_mismatch.search.hops import REACHED, hopped
 from pbrl_mismatch.search.library import UNTOLD, search_library, trace
 from pbrl_mismatch.search.path.pins import may_be_pinned
 from pbrl_mismatch.search.predictive import predictive_test
-from pbrl_mismatch.search.weigh import Weighed, veto, weigh, worth_of_another
+from pbrl_mismatch.search.weigh import Weighed, sure_first, veto, weigh, worth_of_another
 
 Array = NDArray[np.float64]
 
@@ -195,7 +195,7 @@ def _runs_away(tried: list[Fitted]) -> bool:
 
 def held_against(explained: Explained, baseline: Fitted, options: DiagnoseOptions) -> tuple[Weighed, ...]:
     """Return the hypotheses with the likeliest held against what was held out of their fits, beside the baseline's."""
-    return veto(explained.weighed, baseline, partial(judged, stages=explained.stages, options=options))
+    return sure_first(veto(explained.weighed, baseline, partial(judged, stages=explained.stages, options=options)))
 
 
 def _log_odds(weighed: tuple[Weighed, ...]) -> float:

@@ -26,8 +26,10 @@ moves besides the body: how a crate or a caster is turned follows from all that 
 OF_EXACT = 0.01
 """The same of laws that are exact, for what the smoothed path and the sensor's own error leave."""
 CLEAR = 3.0
-"""One effect more has to be likelier, after its prior, by more than this [nat], twenty times: where the law that it joins
-is right nothing is, in more than one recording in twenty (Markov's inequality)."""
+"""One effect more has to be likelier by more than this [nat] after its prior, twenty times: where the law that it joins is
+right nothing is, in more than one recording in twenty (Markov's inequality)."""
+NAMED = 0.5
+"""Effects are named where it is at least so probable that they are there, whatever is beside them."""
 REFINED = 0.01
 """Share of what a law explains that a law of which it is a limit has to explain beyond it."""
 JUDGED = 5
@@ -197,6 +199,24 @@ def _predicts_worse(whole: Fitted, part: Fitted) -> bool:
         return False
     farther = whole.score.rmse_position > part.score.rmse_position
     return farther and whole.score.log_score < part.score.log_score
+
+
+def held_by(weighed: Sequence[Weighed], effects: Iterable[str]) -> float:
+    """Return the probability that all of some effects are there, whatever is beside them."""
+    return min(sum(each.probability for each in weighed if set(effects) <= set(each.effects)), 1.0)
+
+
+def sure_first(weighed: Sequence[Weighed]) -> tuple[Weighed, ...]:
+    """Return hypotheses with the likeliest first that is a part of the likeliest, and probable enough to be named.
+
+    Of one effect alone, and beside another, neither may be, and that the one is there be certain.
+
+    Args:
+        weighed: hypotheses, likeliest first.
+    """
+    parts = [each for each in weighed if each.effects and set(each.effects) <= set(weighed[0].effects)]
+    sure = next((each for each in parts if held_by(weighed, each.effects) >= NAMED and not each.vetoed), weighed[0])
+    return (sure, *(each for each in weighed if each is not sure))
 
 
 def _ordered(entries: Sequence[Weighed]) -> tuple[Weighed, ...]:
