@@ -26,8 +26,8 @@ moves besides the body: how a crate or a caster is turned follows from all that 
 OF_EXACT = 0.01
 """The same of laws that are exact, for what the smoothed path and the sensor's own error leave."""
 CLEAR = 3.0
-"""One effect more has to be likelier by more than this [nat] after its prior, twenty times: where the law that it joins is
-right nothing is, in more than one recording in twenty (Markov's inequality)."""
+"""One effect more has to be likelier by more than this [nat] after its prior, twenty times: where the law that it joins
+is right nothing is, in more than one recording in twenty (Markov's inequality)."""
 NAMED = 0.5
 """Effects are named where it is at least so probable that they are there, whatever is beside them."""
 REFINED = 0.01
