@@ -120,15 +120,14 @@ def test_their_deviations_are_the_density_s_where_that_is_wide_and_has_a_side_pe
     rolling = free.with_effect(EFFECTS["caster_swivel"], scene, 0).with_effect(EFFECTS["payload_change"], scene, 0)
     peak = alone(climb(told(np.random.default_rng(6), track, rolling, rolling.mean[None]), rolling.mean[None]))
     at, top, laplace = rolling.columns.index("payload_time"), peak.coordinates[0], peak.covariance(0)
-    wide = np.full(len(top), 1.6)
-    wide[at] = 0.05  # of a load that was put down while nothing moved, the top's own curvature says nothing
+    wide, narrow = 1.6, 0.05  # of a load that was put down while nothing moved, the top's own curvature says nothing
     whiten = np.linalg.cholesky(np.linalg.inv(laplace))
 
     def density(points: np.ndarray) -> np.ndarray:
         away = (points - top) @ whiten
         aside = (points[:, at] - top[at]) / np.sqrt(laplace[at, at])
-        return -0.5 * np.sum((away / 1.6) ** 2, axis=1) + np.logaddexp(
-            -0.5 * (aside / wide[at]) ** 2, -200.0 - 0.5 * ((aside - 1.0) / 0.3) ** 2
+        return -0.5 * np.sum((away / wide) ** 2, axis=1) + np.logaddexp(
+            -0.5 * (aside / narrow) ** 2, -200.0 - 0.5 * ((aside - 1.0) / 0.3) ** 2
         )
 
     monkeypatch.setattr("pbrl_mismatch.search.posterior.Density", lambda _: density)

@@ -194,7 +194,7 @@ def _runs_away(tried: list[Fitted]) -> bool:
 
 
 def held_against(explained: Explained, baseline: Fitted, options: DiagnoseOptions) -> tuple[Weighed, ...]:
-    """Return the hypotheses with the likeliest held against what was held out of their fits, beside the baseline's."""
+    """Return the hypotheses, what is to be named first, the likeliest held against what was held out of their fits."""
     return sure_first(veto(explained.weighed, baseline, partial(judged, stages=explained.stages, options=options)))
 
 

@@ -207,9 +207,9 @@ def held_by(weighed: Sequence[Weighed], effects: Iterable[str]) -> float:
 
 
 def sure_first(weighed: Sequence[Weighed]) -> tuple[Weighed, ...]:
-    """Return hypotheses with the likeliest first that is a part of the likeliest, and probable enough to be named.
+    """Return hypotheses with what is to be named first: the likeliest, or a part of it where only that is certain.
 
-    Of one effect alone, and beside another, neither may be, and that the one is there be certain.
+    Of an effect alone and the same beside another neither may be probable enough, and that the effect is there certain.
 
     Args:
         weighed: hypotheses, likeliest first.
