@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
+
+import pytest
 
 from pbrl_bag.types import Recording
+from pbrl_mismatch.online import diagnosing
 from pbrl_mismatch.online.diagnosing import Diagnosed, DiagnosisWorker, diagnose_object, options_for
 from pbrl_mismatch.online.found import Findings, Found
 from pbrl_mismatch.online.monitor import Alarm
@@ -37,6 +42,36 @@ def test_another_process_says_the_same(concealed_recording: Callable[..., Record
     worker.start(recording, "table", options)
     worker.stop()
     assert not worker.busy and worker.done() == []
+
+
+class Unpacked(DiagnoseOptions):
+    """Options that cannot be handed to another process."""
+
+    def model_dump(self, **_: Any) -> dict[str, Any]:
+        return {"seed": lambda: 0}
+
+
+@pytest.mark.parametrize(("refused", "reason"), [("process", "no more processes"), ("job", "pickle")])
+def test_a_job_that_cannot_be_begun_is_the_verdict_and_the_next_one_is_done(
+    refused: str, reason: str, concealed_recording: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = unmoved(concealed_recording("clean", 1, seconds=4.0))
+    options = options_for(DiagnoseOptions(), "table", "free")
+
+    def no_more(*_: Any, **__: Any) -> None:
+        raise BlockingIOError(errno.EAGAIN, "no more processes")
+
+    worker = DiagnosisWorker()
+    with monkeypatch.context() as patched:
+        if refused == "process":
+            patched.setattr(diagnosing.subprocess, "Popen", no_more)
+        worker.start(recording, "table", Unpacked() if refused == "job" else options)
+        assert worker.wait(PATIENCE)
+    (found,) = worker.done()
+    assert found.report == {} and found.verdict.startswith("table: not diagnosed: ") and reason in found.verdict
+    worker.start(recording, "table", options)
+    assert worker.wait(PATIENCE)
+    assert worker.done() == [diagnose_object(recording, "table", options)]
 
 
 def test_the_class_that_failed_is_the_baseline() -> None:

@@ -29,6 +29,8 @@ CHILD = "from pbrl_mismatch.online.diagnosing import main; main()"
 """Not with `-m`: what it pickles would be of a module `__main__`."""
 PATIENCE = 2.0
 """Waited for a process that was told to end [s]."""
+Job = tuple[Recording, str, DiagnoseOptions]
+"""(recording, object, options)"""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class DiagnosisWorker:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._waiting: deque[tuple[Recording, str, DiagnoseOptions]] = deque()
+        self._waiting: deque[Job] = deque()
         self._done: list[Diagnosed] = []
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
@@ -82,8 +84,9 @@ class DiagnosisWorker:
             self._waiting = deque(job for job in self._waiting if job[1] != name)
             self._waiting.append((recording, name, options))
             if self._thread is None and not self._stopped:
-                self._thread = threading.Thread(target=self._run, name="diagnosis", daemon=True)
-                self._thread.start()
+                thread = threading.Thread(target=self._run, name="diagnosis", daemon=True)
+                thread.start()
+                self._thread = thread
 
     @property
     def busy(self) -> bool:
@@ -123,37 +126,42 @@ class DiagnosisWorker:
                     self._thread = None
                     return
                 job = self._waiting.popleft()
-                # A session of its own: Ctrl-C in the terminal is for the node, which then ends this.
-                self._process = subprocess.Popen(
-                    [sys.executable, "-c", CHILD],
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.PIPE,
-                    start_new_session=True,
-                )
-            found = _answer(self._process, job)
+            try:
+                found = self._answer(job)
+            except Exception as error:  # one job that cannot be done must not keep the others waiting for ever
+                told = " ".join(str(error).split()) or type(error).__name__
+                found = Diagnosed(job[1], {}, f"{job[1]}: not diagnosed: {told}")
             with self._lock:
                 self._process = None
-                if not self._stopped:
+                if found is not None and not self._stopped:
                     self._done.append(found)
 
-
-def _answer(process: subprocess.Popen[bytes], job: tuple[Recording, str, DiagnoseOptions]) -> Diagnosed:
-    """Hand a job to a process and return what it says."""
-    recording, name, options = job
-    try:
-        out, errors = process.communicate(pickle.dumps((replace(recording, notes=()), name, options.model_dump())))
-    except OSError as error:
-        return Diagnosed(name, {}, f"{name}: not diagnosed: {error}")
-    if process.returncode:
-        lines = errors.decode(errors="replace").strip().splitlines()
-        last = lines[-1] if lines else f"its process ended with {process.returncode}"
-        return Diagnosed(name, {}, f"{name}: not diagnosed: {last}")
-    try:
-        answer: Diagnosed = pickle.loads(out)
-    except Exception as error:  # something else was printed: a fault of ours must not end the watch
-        return Diagnosed(name, {}, f"{name}: not diagnosed: its process answered {out[:40]!r} ({error})")
-    return answer
+    def _answer(self, job: Job) -> Diagnosed | None:
+        """Hand a job to a process of its own and return what it says, None where it was to end before that began."""
+        recording, name, options = job
+        told = pickle.dumps((replace(recording, notes=()), name, options.model_dump()))
+        with self._lock:
+            if self._stopped:
+                return None
+            # A session of its own: Ctrl-C in the terminal is for the node, which then ends this.
+            process = self._process = subprocess.Popen(
+                [sys.executable, "-c", CHILD],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                start_new_session=True,
+            )
+        with process:
+            out, errors = process.communicate(told)
+        if process.returncode:
+            lines = errors.decode(errors="replace").strip().splitlines()
+            last = lines[-1] if lines else f"its process ended with {process.returncode}"
+            return Diagnosed(name, {}, f"{name}: not diagnosed: {last}")
+        try:
+            answer: Diagnosed = pickle.loads(out)
+        except Exception as error:  # something else was printed: a fault of ours must not end the watch
+            return Diagnosed(name, {}, f"{name}: not diagnosed: its process answered {out[:40]!r} ({error})")
+        return answer
 
 
 def main() -> None:
