@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import subprocess
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -42,6 +44,34 @@ def test_another_process_says_the_same(concealed_recording: Callable[..., Record
     worker.start(recording, "table", options)
     worker.stop()
     assert not worker.busy and worker.done() == []
+
+
+def test_what_was_begun_before_it_forgot_is_never_told(
+    concealed_recording: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording, began = unmoved(concealed_recording("clean", 1, seconds=4.0)), threading.Event()
+    options = options_for(DiagnoseOptions(), "table", "free")
+
+    class Told(subprocess.Popen[bytes]):
+        def __init__(self, *given: Any, **named: Any) -> None:
+            super().__init__(*given, **named)
+            began.set()
+
+    worker = DiagnosisWorker()
+    with monkeypatch.context() as patched:
+        patched.setattr(diagnosing, "CHILD", "import time; time.sleep(600)")
+        patched.setattr(diagnosing.subprocess, "Popen", Told)
+        worker.start(recording, "table", options)
+        worker.start(recording, "chair", options)
+        assert began.wait(PATIENCE)
+        worker.forget()
+    worker.start(recording, "table", options)
+    assert worker.wait(PATIENCE)
+    assert worker.done() == [diagnose_object(recording, "table", options)]
+    worker.start(recording, "table", options)
+    assert worker.wait(PATIENCE)
+    worker.forget()
+    assert worker.done() == [], "nor what was ready and had not been fetched"
 
 
 class Unpacked(DiagnoseOptions):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import signal
 import subprocess
@@ -29,32 +30,83 @@ from pbrl_bag.playback import load_bag
 from pbrl_bag.ros.conversions import message_class, profile_from_qos
 from pbrl_bag.types import Recording
 from pbrl_mismatch.online.diagnosing import Diagnosed
+from pbrl_mismatch.online.found import Found
+from pbrl_mismatch.online.monitor import MismatchMonitor
+from pbrl_mismatch.online.options import MonitorOptions
+from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.ros import mismatch_node, watcher
 from pbrl_mismatch.ros.conversions import mismatches_from_msg
 from pbrl_model.posterior import Posterior
 from pbrl_model.ros.conversions import models_to_msg
+from pbrl_model.ros.heard import Heard, Message, recording_of
 
 PATIENCE = 60.0  # [s]
+DRAWS = 20.0 + 0.3 * np.random.default_rng(0).normal(size=(1, 100, 1))
+MODEL = Posterior("table", "free", ("mass",), DRAWS)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class AtHand:
-    """A worker that has its verdict ready."""
+    """A worker that has its verdict ready; it is fetched where `lets`."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[Recording, str, Any]] = []
+        self.lets = True
         self._ready: list[Diagnosed] = []
 
     def start(self, recording: Recording, name: str, options: Any) -> None:
         self.asked.append((recording, name, options))
-        self._ready.append(Diagnosed(name, {"unknown": True}, f"{name}: something is left out"))
+        self._ready.append(Diagnosed(name, {"unknown": True}, f"{name}: something is left out {len(self.asked)}"))
 
     def done(self) -> list[Diagnosed]:
+        if not self.lets:
+            return []
         ready, self._ready = self._ready, []
         return ready
 
-    def stop(self) -> None:
+    def forget(self) -> None:
         self._ready.clear()
+
+    stop = forget
+
+
+class Stream:
+    """A watcher whose listener hears a bag, without a graph and without a thread.
+
+    Attributes:
+        told: everything that was found, at each change.
+    """
+
+    def __init__(self, bag: Path) -> None:
+        loaded = load_bag(bag)
+        kinds = {name: message_class(topic.type) for name, topic in loaded.topics.items()}
+        self._messages = [Message(one.topic, kinds[one.topic], one.data) for one in loaded.messages]
+        self._heard = Heard(10**9)
+        self.follow, self.fresh = self._heard.follow, self._heard.fresh
+        self.told: list[tuple[Found, ...]] = []
+        self.watcher = watcher.Watcher(
+            MismatchMonitor(MonitorOptions(gather=1.0)),
+            self,  # type: ignore[arg-type]
+            DiagnoseOptions(),
+            lambda entries, _: self.told.append(entries),
+            lambda _: None,
+            0.02,
+        )
+        self.watcher.give({"table": MODEL})
+        self.follow()
+
+    def recording(self) -> Recording:
+        return recording_of(self._heard.kept())
+
+    def play(self, done: Callable[[], Any] = lambda: False) -> None:
+        """Let the watcher hear the bag from its beginning, to its end or until something holds."""
+        for k, message in enumerate(self._messages):
+            self._heard.add(message)
+            if k % 40 == 39:
+                self.watcher.step()
+                if done():
+                    return
+        self.watcher.step()
 
 
 class Graph:
@@ -128,8 +180,7 @@ def test_an_alarm_comes_at_once_and_the_diagnosis_later(
     graph: Graph, at_hand: AtHand, concealed_recording: Callable[..., Recording], tmp_path: Path
 ) -> None:
     recording = concealed_recording("floor_slope", 1, seconds=9.0)
-    draws = 20.0 + 0.3 * np.random.default_rng(0).normal(size=(1, 100, 1))
-    graph.models.publish(models_to_msg([Posterior("table", "free", ("mass",), draws)], Time()))
+    graph.models.publish(models_to_msg([MODEL], Time()))
     graph.until(graph.models.get_subscription_count)
     graph.play(write_recording(recording, tmp_path / "bag"))
     graph.until(lambda: graph.heard and graph.heard[-1].mismatches and graph.heard[-1].mismatches[0].diagnosed)
@@ -137,10 +188,34 @@ def test_an_alarm_comes_at_once_and_the_diagnosis_later(
     assert alarms and alarms[0].mismatches[0].model_class == "free"
     found = mismatches_from_msg(graph.heard[-1])["table"]
     assert 1.5 < found.alarm.time < 9.0 and found.alarm.p_value < 0.01
-    assert found.verdict == "table: something is left out" and graph.heard[-1].mismatches[0].unknown
+    assert found.verdict == "table: something is left out 1" and graph.heard[-1].mismatches[0].unknown
     ((given, name, options),) = at_hand.asked
     assert name == "table" and options.baseline == ("free",) and given.grasps[0].start == pytest.approx(1.5, abs=0.01)
     assert given.wrenches["left"].time[-1] >= found.alarm.time
+
+
+def test_what_was_begun_or_asked_for_on_another_clock_is_not_told(
+    at_hand: AtHand,
+    concealed_recording: Callable[..., Recording],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(watcher, "QUIET", math.inf)
+    stream = Stream(write_recording(concealed_recording("floor_slope", 1, seconds=9.0), tmp_path / "bag"))
+    at_hand.lets = False
+    stream.play()
+    assert len(at_hand.asked) == 1 and stream.told[-1]
+    stream.watcher.diagnose_again("table")
+    before = len(stream.told)
+    stream.play(lambda: len(stream.told) > before and stream.told[-1])
+    assert stream.told[before] == () and len(at_hand.asked) == 1
+    at_hand.lets = True
+    stream.watcher.step()
+    assert stream.told[-1][0].diagnosed is None, "the verdict is of the other clock"
+    stream.play(lambda: len(at_hand.asked) == 2)
+    monkeypatch.setattr(watcher, "QUIET", -1.0)
+    stream.watcher.step()
+    assert len(at_hand.asked) == 2, "nobody asked on this clock"
 
 
 @pytest.mark.parametrize("argument", ["false_alarm:=2.0", "keeps:=10.0"])

@@ -73,6 +73,7 @@ class DiagnosisWorker:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._waiting: deque[Job] = deque()
+        self._under_way: Job | None = None
         self._done: list[Diagnosed] = []
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
@@ -108,14 +109,21 @@ class DiagnosisWorker:
             found, self._done = self._done, []
             return found
 
+    def forget(self) -> None:
+        """Give up what waits and what is under way; nothing that was found and not fetched yet is told any more."""
+        with self._lock:
+            self._waiting.clear()
+            self._done.clear()
+            self._under_way = None
+            if self._process is not None:
+                self._process.terminate()
+
     def stop(self) -> None:
         """End, without waiting for a diagnosis that is under way."""
         with self._lock:
             self._stopped = True
-            self._waiting.clear()
-            process, thread = self._process, self._thread
-        if process is not None:
-            process.terminate()
+            thread = self._thread
+        self.forget()
         if thread is not None:
             thread.join(PATIENCE)
 
@@ -125,7 +133,7 @@ class DiagnosisWorker:
                 if self._stopped or not self._waiting:
                     self._thread = None
                     return
-                job = self._waiting.popleft()
+                job = self._under_way = self._waiting.popleft()
             try:
                 found = self._answer(job)
             except Exception as error:  # one job that cannot be done must not keep the others waiting for ever
@@ -133,15 +141,16 @@ class DiagnosisWorker:
                 found = Diagnosed(job[1], {}, f"{job[1]}: not diagnosed: {told}")
             with self._lock:
                 self._process = None
-                if found is not None and not self._stopped:
+                if found is not None and self._under_way is job:
                     self._done.append(found)
+                self._under_way = None
 
     def _answer(self, job: Job) -> Diagnosed | None:
-        """Hand a job to a process of its own and return what it says, None where it was to end before that began."""
+        """Hand a job to a process of its own and return what it says, None where it was given up before."""
         recording, name, options = job
         told = pickle.dumps((replace(recording, notes=()), name, options.model_dump()))
         with self._lock:
-            if self._stopped:
+            if self._under_way is not job:
                 return None
             # A session of its own: Ctrl-C in the terminal is for the node, which then ends this.
             process = self._process = subprocess.Popen(

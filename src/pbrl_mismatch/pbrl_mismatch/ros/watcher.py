@@ -129,6 +129,9 @@ class Watcher:
             self._monitor.new_clock()
             self._gathering.clear()
             self._findings.forget()
+            self._worker.forget()
+            with self._lock:
+                self._asked.clear()
             self._tell()
         if self._live.left_out > 2 * self._left_out:
             self._left_out = self._live.left_out
