@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_bag.types import PoseStream, Recording, WrenchStream
+from pbrl_model.online.windows import holds_of, known_until
 
 BEFORE = 2.5
 """Kept before a grasp [s]: weight and bias of a wrist are read there, and the smoother looks back."""
 AFTER = 0.5
 """And after its beginning [s]."""
+TAIL = 1.0
+"""Kept after the last hold [s]."""
 
 
 def between(recording: Recording, start: float, end: float) -> Recording:
@@ -67,4 +70,12 @@ def last_holds(recording: Recording, name: str, seconds: float) -> Recording:
         if total >= seconds:
             break
         start, total = min(start, grasp.start), total + grasp.end - grasp.start
-    return between(recording, start - BEFORE, end + 1.0)
+    return between(recording, start - BEFORE, end + TAIL)
+
+
+def heard_to_the_end(recording: Recording, name: str, since: float) -> bool:
+    """Tell whether an object's last hold ended after `since` [s], and all has come in that `last_holds` takes of it."""
+    holds = holds_of(recording, name)
+    if not holds or not holds[-1].ended or holds[-1].end <= since:
+        return False
+    return known_until(recording, name, holds[-1].grippers) >= holds[-1].end + TAIL

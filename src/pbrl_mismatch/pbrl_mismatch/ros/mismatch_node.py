@@ -103,10 +103,11 @@ class MismatchNode(Node):
         if not self._pusher.service_is_ready():
             response.message = "expected somebody who offers /push, a robot or a simulator; nobody does"
             return response
+        since = self._watcher.now
         done: PushObject.Response = await self._pusher.call_async(push_to_msg(push))
         response.success, response.message = done.success, done.message
         if done.success:
-            self._watcher.diagnose_again(push["object"])
+            self._watcher.diagnose_again(push["object"], since)
             response.message = f"pushed: {json.dumps(dict(push))}; a new diagnosis of {push['object']} follows"
         return response
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -11,7 +12,7 @@ from pbrl_bag.errors import BagError
 from pbrl_mismatch.online.diagnosing import DiagnosisWorker, options_for
 from pbrl_mismatch.online.found import Findings, Found
 from pbrl_mismatch.online.monitor import Alarm, MismatchMonitor
-from pbrl_mismatch.online.slices import last_holds
+from pbrl_mismatch.online.slices import heard_to_the_end, last_holds
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_model.errors import ModelError
 from pbrl_model.online.live import LiveRecording
@@ -22,6 +23,8 @@ PATIENCE = 1.0
 """Waited for a step to end [s]."""
 QUIET = 1.0
 """Nothing heard for so long [s]: what there is for a diagnosis is all there will be."""
+LONGEST = 10.0
+"""A diagnosis that is asked for begins so long after that in any case [s]: the object may be held on to."""
 
 Changed = Callable[[tuple[Found, ...], float], None]
 """(everything that was found, newest stamp heard [s])."""
@@ -60,7 +63,8 @@ class Watcher:
         self._findings = Findings()
         self._worker = DiagnosisWorker()
         self._gathering: dict[str, Alarm] = {}
-        self._asked: set[str] = set()
+        self._asked: dict[str, tuple[float, float]] = {}
+        self._now = -math.inf
         self._given: dict[str, Posterior] = {}
         self._said: dict[str, str] = {}
         self._lock = threading.Lock()
@@ -89,10 +93,20 @@ class Watcher:
         """Return the push that would tell most of what was found apart, in the form of `report.json`."""
         return self._findings.next_push
 
-    def diagnose_again(self, name: str) -> None:
-        """Diagnose an object anew with all that was heard, once nothing more comes; safe from any thread."""
+    @property
+    def now(self) -> float:
+        """Return the newest stamp that was heard [s], minus infinity before the first; safe from any thread."""
+        return self._now
+
+    def diagnose_again(self, name: str, since: float) -> None:
+        """Diagnose an object anew with all that was heard, once it was let go of; safe from any thread.
+
+        Args:
+            name: of the object.
+            since: a hold that ends after this is waited for, with what comes late of it [s, recording's clock].
+        """
         with self._lock:
-            self._asked.add(name)
+            self._asked[name] = (since, time.monotonic())
 
     def _run(self) -> None:
         while not self._stop.wait(self._period):
@@ -105,6 +119,7 @@ class Watcher:
         """Take in what has come, test, begin diagnoses that are due, and tell what is new."""
         if self._take_messages():
             self._heard_at = time.monotonic()
+        self._now = self._live.now
         with self._lock:
             given, self._given = self._given, {}
         self._monitor.give(given, self._live.now)
@@ -156,17 +171,18 @@ class Watcher:
                     self._gathering[alarm.object] = alarm
 
     def _begin_diagnoses(self) -> None:
-        """Diagnose where enough was heard since the alarm, or nothing more comes."""
+        """Diagnose where enough was heard since the alarm or of the push that was asked for, or nothing more comes."""
         quiet = time.monotonic() - self._heard_at > QUIET
         wait = self._monitor.options.gather
-        if quiet:
-            with self._lock:
-                asked, self._asked = self._asked, set()
-            again = {name: self._findings.alarm_of(name) for name in sorted(asked)}
-            self._gathering |= {name: alarm for name, alarm in again.items() if alarm is not None}
-        due = [alarm for alarm in self._gathering.values() if quiet or self._live.now >= alarm.time + wait]
-        for alarm in due:
-            del self._gathering[alarm.object]
+        due = {name: one for name, one in self._gathering.items() if quiet or self._live.now >= one.time + wait}
+        with self._lock:
+            over = [name for name, asked in sorted(self._asked.items()) if quiet or self._is_over(name, *asked)]
+            for name in over:
+                del self._asked[name]
+        again = {name: self._findings.alarm_of(name) for name in over}
+        due |= {name: alarm for name, alarm in again.items() if alarm is not None}
+        for alarm in due.values():
+            self._gathering.pop(alarm.object, None)
             assert self._options is not None
             try:
                 recording = last_holds(self._listener.recording(), alarm.object, self._monitor.options.keep)
@@ -174,6 +190,15 @@ class Watcher:
                 self._say("diagnosis", str(error))
                 continue
             self._worker.start(recording, alarm.object, options_for(self._options, alarm.object, alarm.model_class))
+
+    def _is_over(self, name: str, since: float, at: float) -> bool:
+        """Tell whether the push of an object is, that was begun at `since` [s] and asked about at `at` [s, steady]."""
+        if time.monotonic() - at > LONGEST:
+            return True
+        try:
+            return heard_to_the_end(self._live.recording(), name, since)
+        except BagError:  # said where it is watched
+            return False
 
     def _tell(self) -> None:
         if not self._stop.is_set():
