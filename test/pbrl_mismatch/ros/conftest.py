@@ -24,11 +24,13 @@ def at_hand(monkeypatch: pytest.MonkeyPatch) -> AtHand:
 
 
 @pytest.fixture
-def graph(monkeypatch: pytest.MonkeyPatch, at_hand: AtHand, domain: int) -> Iterator[Graph]:
+def graph(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, at_hand: AtHand, domain: int
+) -> Iterator[Graph]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     context = Context()
     rclpy.init(context=context, domain_id=domain)
-    graph = Graph(context)
+    graph = Graph(context, **getattr(request, "param", {}))
     yield graph
     graph.close()
     rclpy.try_shutdown(context=context)

@@ -7,11 +7,14 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from pbrl_msgs.srv import PushObject
+from rclpy.node import Node
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 from watched import PUSH, AtHand, Graph
 
@@ -66,6 +69,48 @@ def test_a_push_that_was_asked_for_is_diagnosed_though_the_streams_go_on(
     given = at_hand.asked[1][0]
     assert [grasp.end for grasp in given.grasps] == pytest.approx([10.5, 18.5], abs=0.05)
     assert given.wrenches["left"].time[-1] == pytest.approx(19.5, abs=0.1), "with what comes late"
+
+
+@pytest.fixture
+def nobody(graph: Graph) -> Iterator[None]:
+    """Somebody who offers /push and never answers."""
+    node = Node("pusher", context=graph.client.context)
+    node.create_service(PushObject, "/push", lambda _, response: response)
+    yield
+    node.destroy_node()
+
+
+def asked(graph: Graph, at_hand: AtHand, bag: Path) -> Future:
+    """Ask for the next experiment once a diagnosis has named one."""
+    at_hand.push = PUSH
+    graph.diagnosed(bag)
+    graph.until(graph.next_experiment.service_is_ready)
+    return graph.next_experiment.call_async(Trigger.Request())
+
+
+@pytest.mark.usefixtures("nobody")
+def test_the_node_goes_on_while_a_push_is_made(
+    graph: Graph, at_hand: AtHand, concealed_recording: Callable[..., Recording], tmp_path: Path
+) -> None:
+    bag = write_recording(concealed_recording("floor_slope", 1, seconds=9.0), tmp_path / "bag")
+    answer, told = asked(graph, at_hand, bag), []
+    graph.client.create_subscription(DiagnosticArray, "/diagnostics", told.append, 10)
+    graph.until(lambda: len(told) >= 4)
+    assert not answer.done()
+
+
+@pytest.mark.usefixtures("nobody")
+@pytest.mark.parametrize("graph", [{"patience": 1.0}], indirect=True)
+def test_a_push_that_does_not_end_is_given_up(
+    graph: Graph, at_hand: AtHand, concealed_recording: Callable[..., Recording], tmp_path: Path
+) -> None:
+    bag = write_recording(concealed_recording("floor_slope", 1, seconds=9.0), tmp_path / "bag")
+    answer = asked(graph, at_hand, bag)
+    graph.until(answer.done)
+    assert not answer.result().success and "table has not ended within 1 s" in answer.result().message
+    again = graph.next_experiment.call_async(Trigger.Request())
+    graph.until(again.done)
+    assert again.result() == answer.result(), "who asks again is answered, too"
 
 
 @pytest.mark.parametrize("argument", ["false_alarm:=2.0", "keeps:=10.0"])

@@ -117,10 +117,11 @@ class Stream:
 
 
 class Graph:
-    """The node in a thread, and somebody beside it who publishes and listens."""
+    """The node in a thread, with more parameters where they are named; somebody beside it publishes and listens."""
 
-    def __init__(self, context: Context) -> None:
-        override = [Parameter("period", Parameter.Type.DOUBLE, 0.02), Parameter("gather", Parameter.Type.DOUBLE, 1.0)]
+    def __init__(self, context: Context, **more: float) -> None:
+        chosen = {"period": 0.02, "gather": 1.0, **more}
+        override = [Parameter(name, Parameter.Type.DOUBLE, value) for name, value in chosen.items()]
         self.node = mismatch_node.MismatchNode(context, parameter_overrides=override)
         self.client = Node("client", context=context)
         self._spinner = SingleThreadedExecutor(context=context)

@@ -11,7 +11,8 @@ from typing import Any
 
 from pbrl_msgs.msg import Mismatches, ObjectModels
 from pbrl_msgs.srv import PushObject
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -61,6 +62,8 @@ class MismatchNode(Node):
         without: list[str] = declare(self, "without", [], "effects that the library does without", choices=EFFECTS)
         workers = declare(self, "workers", 1, "threads of a diagnosis", (1, 256))
         seed = declare(self, "seed", 0, "seed of every random draw", (0, 2**31 - 1))
+        waits = "longest wait for the answer to a push that was asked for [s]"
+        self._patience = declare(self, "patience", 600.0, waits, (0.1, 1e5))
         period = declare(self, "period", 0.1, "time between two looks at what has come [s]", (0.01, 1.0))
         memory = declare(self, "memory", MEMORY, "most that is kept of messages for a diagnosis [MB]", (1.0, 100_000.0))
         refuse_unknown(self)
@@ -79,9 +82,10 @@ class MismatchNode(Node):
         diagnostics = Diagnostics(self, lambda: self._doing, numbers=self._numbers)
         self.listener.tell(diagnostics)
         diagnostics.subscribe(ObjectModels, "object_models", self._take_models, LATCHED)
-        # In a group of its own: the answer comes while whoever asked for the experiment is still waiting.
+        # In groups of their own: a push may take minutes, in which the node has to go on. One thread runs all of them.
         self._pusher = self.create_client(PushObject, "push", callback_group=ReentrantCallbackGroup())
-        self.create_service(Trigger, "run_next_experiment", self._run_next_experiment)
+        group = MutuallyExclusiveCallbackGroup()
+        self.create_service(Trigger, "run_next_experiment", self._run_next_experiment, callback_group=group)
         self._watcher.start()
         self.listener.start()
 
@@ -104,12 +108,26 @@ class MismatchNode(Node):
             response.message = "expected somebody who offers /push, a robot or a simulator; nobody does"
             return response
         since = self._watcher.now
-        done: PushObject.Response = await self._pusher.call_async(push_to_msg(push))
+        done = await self._pushed(push_to_msg(push))
+        if done is None:
+            late = f"the push of {push['object']} has not ended within {self._patience:g} s"
+            response.message = f"{late} (patience): see whether whoever makes it still runs, then ask again"
+            return response
         response.success, response.message = done.success, done.message
         if done.success:
             self._watcher.diagnose_again(push["object"], since)
             response.message = f"pushed: {json.dumps(dict(push))}; a new diagnosis of {push['object']} follows"
         return response
+
+    async def _pushed(self, push: PushObject.Request) -> PushObject.Response | None:
+        """Have a push made; None where it does not end in time: who makes it may have died, and then never answers."""
+        call = self._pusher.call_async(push)
+        clock = Clock(clock_type=ClockType.STEADY_TIME)
+        late = self.create_timer(self._patience, call.cancel, clock=clock)
+        try:
+            return await call
+        finally:
+            self.destroy_timer(late)
 
     def _changed(self, entries: tuple[Found, ...], stamp: float) -> None:
         self._alarms = len(entries)
