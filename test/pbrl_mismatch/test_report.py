@@ -10,7 +10,7 @@ import pytest
 from shapely import Polygon, contains_xy
 
 from pbrl_mismatch import EFFECTS, report
-from pbrl_mismatch.effects.effect import disc
+from pbrl_mismatch.effects.effect import Effect, Scene, disc
 from pbrl_mismatch.report import findings_of, place_uncertainty
 from pbrl_mismatch.search.weigh import Weighed
 
@@ -52,6 +52,22 @@ def test_every_place_s_middle_is_where_its_outline_is() -> None:
     placed = [effect for effect in EFFECTS.values() if effect.where is not None]
     assert placed and all(effect.place is not None for effect in placed)
     assert all(effect.place is None for effect in EFFECTS.values() if effect.where is None)
+
+
+@pytest.mark.parametrize("effect", [each for each in EFFECTS.values() if each.where], ids=lambda each: each.name)
+def test_a_place_is_told_in_the_world_or_in_its_object_s_frame(effect: Effect, monkeypatch: pytest.MonkeyPatch) -> None:
+    zero, one = np.zeros(2), np.ones(2)
+    scene = Scene(zero, one, zero, 0.5 * one, mass=20.0, force=10.0, speed=0.1, start=0.0, seconds=20.0)
+    means = {each.column: {"mean": 0.1} for each in effect.parameters(scene)}
+    monkeypatch.setattr(report, "parameters_of", lambda *_: means)
+    monkeypatch.setattr(report, "activity", lambda *_: {effect.name: None})
+    objective = SimpleNamespace(cuts=SimpleNamespace(track=SimpleNamespace(object="table")))
+    peak = SimpleNamespace(settled=[True], objective=objective)
+    hypothesis = SimpleNamespace(columns=())
+    fits: Any = SimpleNamespace(usual_scale=1.0, unexplained=0.0, peak=peak, hypothesis=hypothesis, row=None)
+    (told,) = findings_of(fits, (Weighed((effect.name,), fits, 0.0, 1.0, False),), scene, exact=False).effects
+    moves = effect.name in ("second_wheel", "com_offset", "payload_change")
+    assert told.to_report()["where"]["frame"] == ("table" if moves else "world")
 
 
 def test_of_two_effects_the_one_that_explains_more_alone_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,7 +49,8 @@ class Finding:
         effect: its name.
         probability: of the hypothesis; of what is named, that it is there, whatever is beside it.
         parameters: mean, sd and unit by name.
-        where: frame, outline and the ellipse that holds its middle with 95 % by Laplace, or None.
+        where: frame ("world" or the object's name), outline and the ellipse that holds its middle with 95 % by Laplace;
+            or None.
         when: intervals [s], or None.
         direction: the frame in which its force keeps its direction, or what it follows.
         fitted: the hypothesis.
@@ -147,21 +148,23 @@ def _finding(weighed: Weighed, effect: Effect, scene: Scene) -> Finding:
     parameters = parameters_of(fitted, {each.column for each in effect.parameters(scene)})
     values = {name: float(entry["mean"]) for name, entry in parameters.items()}
     where = effect.where(values, scene) if effect.where is not None else None
-    acts = activity(fitted.peak.objective.cuts.track, fitted.row, [effect.name])[effect.name]
+    track = fitted.peak.objective.cuts.track
+    acts = activity(track, fitted.row, [effect.name])[effect.name]
     return Finding(
         effect.name,
         weighed.probability,
         parameters,
-        None if where is None else _told(where, place_uncertainty(fitted, effect, where)),
+        None if where is None else _told(where, track.object, place_uncertainty(fitted, effect, where)),
         None if acts is None else [list(each) for each in acts],
         effect.direction,
         fitted,
     )
 
 
-def _told(where: Where, uncertainty: Array | None) -> dict[str, Any]:
-    """Return the form of `report.json`."""
-    told: dict[str, Any] = {"frame": where.frame, "shape": np.round(where.shape, 4).tolist()}
+def _told(where: Where, name: str, uncertainty: Array | None) -> dict[str, Any]:
+    """Return the form of `report.json`; `name` is the object's, and that of its frame."""
+    frame = name if where.frame == "body" else where.frame
+    told: dict[str, Any] = {"frame": frame, "shape": np.round(where.shape, 4).tolist()}
     return told if uncertainty is None else {**told, "uncertainty": np.round(uncertainty, 4).tolist()}
 
 

@@ -142,7 +142,7 @@ def test_the_corners_of_a_patch_go_round(stage: Stage) -> None:
         drawn = DRAWS["floor_patch"](np.random.default_rng(seed), stage, 0.5)
         told = told_values(drawn, stage.with_concealed(drawn))
         place = EFFECTS["floor_patch"].where(told, SCENE)
-        assert place is not None and place.frame == "floor"
+        assert place is not None and place.frame == "world"
         away = np.linalg.norm(place.shape[:, None] - np.array(drawn["floor_patch"][0]["polygon"]), axis=-1)
         assert away.min(axis=0).max() < 1e-9 and away.min(axis=1).max() < 1e-9
         assert -0.5 * math.pi <= told["patch_theta"] <= 0.5 * math.pi

@@ -86,7 +86,7 @@ def patch(frame: str) -> Found:
 
 
 def test_a_diagnosis_is_drawn_where_it_belongs() -> None:
-    named = {"table": patch("world"), "still": patch("body"), "gone": patch("world"), "pillar": patch("joint")}
+    named = {"table": patch("world"), "still": patch("still"), "gone": patch("world"), "pillar": patch("joint")}
     found = Diagnosed(named, {"table": Lacking.model_validate(lacking())})
     data = decorated(shown_of(recorded(), "bag"), Extras(), {}, found).data()
     strict(data)

@@ -32,8 +32,6 @@ BESIDE = 0.5
 """For so long before and after a missing stretch what is left out is hardly told either [s]."""
 SHOWN = 8
 BLUE, ORANGE, GREY, PURPLE = "#0067a8", "#c45500", "#8a9096", "#a3377a"
-ON_THE_FLOOR = ("world", "floor")
-"""Frames of places that stay where they are."""
 
 
 def floor(body: BodyGeometry, found: ObjectDiagnosis) -> str:
@@ -85,14 +83,14 @@ def _where(axes: Axes, entry: Mapping[str, Any], last: Array) -> None:
     if not where or not where.get("shape"):
         return
     shape = np.array(where["shape"], dtype=float).reshape(-1, 2)
-    shape = shape if where["frame"] in ON_THE_FLOOR else placed(shape, last)
+    shape = shape if where["frame"] == "world" else placed(shape, last)
     if len(shape) > 2:
         axes.fill(*shape.T, facecolor=PURPLE, alpha=0.2, edgecolor=PURPLE, lw=1.5, zorder=4)
     else:
         axes.plot(*shape.T, "P", color=PURPLE, ms=10, zorder=4)
     if where.get("uncertainty"):
         around = np.array(where["uncertainty"], dtype=float)
-        around = around if where["frame"] in ON_THE_FLOOR else placed(around, last)
+        around = around if where["frame"] == "world" else placed(around, last)
         axes.plot(*np.vstack([around, around[:1]]).T, color=PURPLE, lw=1.0, ls=(0, (4, 3)), zorder=4)
     top = shape[np.argmax(shape[:, 1])]
     axes.annotate(

@@ -24,8 +24,6 @@ Array = NDArray[np.float64]
 
 MOST_SAMPLES = 6000
 """Moments of one object on a page; of a longer recording every so many are left out."""
-ON_THE_BODY = ("base", "body")
-"""Frames of places that move with the object, besides its own name."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +158,7 @@ def _places(effects: list[dict[str, Any]], name: str) -> list[tuple[str, bool, A
         where = entry.get("where")
         if where and where.get("shape"):
             shape = np.array(where["shape"], dtype=float).reshape(-1, 2)
-            found.append((str(entry["effect"]), where["frame"] in (*ON_THE_BODY, name), shape))
+            found.append((str(entry["effect"]), where["frame"] == name, shape))
     return found
 
 

@@ -20,10 +20,8 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
 Interval = tuple[Finite, Finite]
 
-WORLD = ("world", "floor")
-"""Frames of places that stay where they are."""
-ON_THE_BODY = ("base", "body")
-"""Frames of places that move with the object, besides its own name; those in other frames are not drawn."""
+WORLD = "world"
+"""Frame of places that stay where they are; those that move with an object are in its frame, others are not drawn."""
 
 
 class _Part(BaseModel):
@@ -126,7 +124,7 @@ def regions_of(report: Mapping[str, Found], objects: list[str], origin: float) -
         {
             "effect": f"{named.effect} {100 * named.probability:.0f} %",
             "of": objects.index(name),
-            "object": None if named.where.frame in WORLD else objects.index(name),
+            "object": None if named.where.frame == WORLD else objects.index(name),
             "shape": [list(p) for p in named.where.shape],
             "uncertainty": [list(p) for p in named.where.uncertainty],
             "when": [[a - origin, b - origin] for a, b in named.when or ()],
@@ -134,7 +132,7 @@ def regions_of(report: Mapping[str, Found], objects: list[str], origin: float) -
         for name, found in report.items()
         if name in objects
         for named in found.effects
-        if named.where is not None and named.where.shape and named.where.frame in (*WORLD, *ON_THE_BODY, name)
+        if named.where is not None and named.where.shape and named.where.frame in (WORLD, name)
     ]
 
 

@@ -19,7 +19,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 
 def where(values: Values, scene: Scene) -> Where | None:
     """Return the place that it has."""
-    return disc("floor", values["detent_x"], values["detent_y"], values["detent_width"])
+    return disc("world", values["detent_x"], values["detent_y"], values["detent_width"])
 
 
 EFFECT = Effect(

@@ -15,7 +15,7 @@ from pbrl_mismatch.kernels.columns import COLUMN, UNIT
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
-Site = Literal["body", "floor", "world", "time", "sensor"]
+Site = Literal["world", "body"]
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,13 @@ class Scene:
 
 @dataclass(frozen=True)
 class Where:
-    """A place that an effect has: an outline (k, 2) [m] in a frame, "world" or the object's."""
+    """A place that an effect has.
+
+    Attributes:
+        frame: "world", in which the object's poses are told, or "body", the object's own; a report calls that by the
+            object's name.
+        shape: (k, 2) outline [m].
+    """
 
     frame: Site
     shape: Array

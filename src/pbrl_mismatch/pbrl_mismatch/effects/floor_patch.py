@@ -24,7 +24,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 def where(values: Values, scene: Scene) -> Where | None:
     """Return the place that it has."""
     return rectangle(
-        "floor",
+        "world",
         values["patch_x"],
         values["patch_y"],
         values["patch_length"],

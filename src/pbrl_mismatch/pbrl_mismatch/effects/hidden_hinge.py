@@ -23,7 +23,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 
 def where(values: Values, scene: Scene) -> Where | None:
     """Return the place that it has."""
-    return disc("floor", values["pivot_x"], values["pivot_y"], 0.05)
+    return disc("world", values["pivot_x"], values["pivot_y"], 0.05)
 
 
 EFFECT = Effect(

@@ -22,8 +22,8 @@ def where(values: Values, scene: Scene) -> Where | None:
     """Return the place that it has."""
     x, y, half = values["obstacle_x"], values["obstacle_y"], values["obstacle_radius"]
     if "obstacle_angle" in values:
-        return rectangle("floor", x, y, half, half, values["obstacle_angle"])
-    return disc("floor", x, y, half)
+        return rectangle("world", x, y, half, half, values["obstacle_angle"])
+    return disc("world", x, y, half)
 
 
 EFFECT = Effect(

@@ -213,7 +213,7 @@ def _parameters(own: OwnEffect, scene: Scene) -> tuple[Parameter, ...]:
 
 def _where(own: OwnEffect, values: Values) -> Where | None:
     assert own.place is not None
-    return disc("floor", values[own.column(own.place[0])], values[own.column(own.place[1])], 0.05)
+    return disc("world", values[own.column(own.place[0])], values[own.column(own.place[1])], 0.05)
 
 
 def _try(own: OwnEffect, compiled: Any, effect: Effect) -> None:

@@ -19,7 +19,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 
 def where(values: Values, scene: Scene) -> Where | None:
     """Return the place that it has."""
-    return disc("floor", values["tether_x"], values["tether_y"], 0.05)
+    return disc("world", values["tether_x"], values["tether_y"], 0.05)
 
 
 EFFECT = Effect(

@@ -23,8 +23,8 @@ def where(values: Values, scene: Scene) -> Where | None:
     """Return the place that it has."""
     x, y, half = values["unseen_x"], values["unseen_y"], values["unseen_radius"]
     if "unseen_angle" in values:
-        return rectangle("floor", x, y, half, half, values["unseen_angle"])
-    return disc("floor", x, y, half)
+        return rectangle("world", x, y, half, half, values["unseen_angle"])
+    return disc("world", x, y, half)
 
 
 EFFECT = Effect(
