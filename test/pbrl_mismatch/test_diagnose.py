@@ -67,9 +67,10 @@ def test_the_report_has_the_contract_s_form(found: Diagnosis) -> None:
     table = report["objects"]["table"]
     assert set(table) == {
         "mismatch", "p_value", "effects", "alternatives", "unexplained_fraction", "unknown", "heldout", "not_shown",
-        "unknown_description",
+        "unknown_description", "localisation",
     }  # fmt: skip
     assert table["unknown_description"] is None
+    assert table["localisation"]["sentences"] and len(table["localisation"]["holds"]) == 1
     for entry in table["not_shown"]:
         assert set(entry) == {"effect", "smallest", "plausible", "unit", "chance", "motion"}
         assert entry["effect"] != "viscous_drag"

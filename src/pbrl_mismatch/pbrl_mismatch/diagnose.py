@@ -43,6 +43,7 @@ from pbrl_mismatch.search.predictive import Verdict, predictive_test
 from pbrl_mismatch.search.told_baseline import ToldBaseline, baseline_from_model
 from pbrl_mismatch.search.weigh import Weighed
 from pbrl_mismatch.unknown.describe import describe_unknown
+from pbrl_mismatch.where.localise import localise
 from pbrl_model.fitting.episodes import body_of, motions_of, usable_episodes
 from pbrl_model.predict import UNKNOWN_MASS
 from pbrl_model.sensing.wrench_error import wrench_error
@@ -279,9 +280,15 @@ def _diagnose_object(
         "heldout": held_out_report(baseline, named, floor),
         "not_shown": [each.to_report() for each in could_not_show(rng, named, absent, grip, options.workers)],
         "unknown_description": None,
+        "localisation": None,
     }
     notes = [sentence(track.object, mismatch, verdict, found), *found.notes, *missing_notes(track)]
     notes += note_on_unheard(track.unheard)
+    if mismatch:
+        try:
+            report["localisation"] = localise(track, baseline.row).to_report()
+        except MismatchError as error:
+            notes.append(f"where the two part cannot be told: {error}")
     if mismatch and not found.effects:
         try:
             report["unknown_description"] = describe_unknown(rng, track, residual, baseline.row).to_report()

@@ -24,6 +24,8 @@ def told_of_object(report: Mapping[str, Any]) -> Told:
         report: its part of `report.json`; keys may be missing.
     """
     found: Told = []
+    if report.get("localisation"):
+        found.append(("Where the model falls short, whatever the reason", sentences(report["localisation"])))
     if report.get("unknown_description"):
         found.append(("What the unknown is like", sentences(report["unknown_description"])))
     if report.get("not_shown"):
