@@ -8,21 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+from wandering import MASS, table_row
 
 from pbrl_bag.types import Recording
 from pbrl_mismatch import MismatchError, track_of
 from pbrl_mismatch.activity import GAP, NEAR, activity, intervals, without, wrench_sizes
-from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
-
-MASS = 20.0
-
-
-def table_row(**values: float) -> np.ndarray:
-    row = neutral_row()
-    row[COLUMN["mass"]] = MASS
-    for name, value in values.items():
-        row[COLUMN[name]] = value
-    return row
+from pbrl_mismatch.kernels.columns import COLUMN
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +57,17 @@ def test_beside_a_wheel_a_patch_acts_only_where_a_foot_is_on_it(track: Any, cone
     assert activity(track, wheel, ["floor_patch"])["floor_patch"] == ()
     wheel[[COLUMN["patch_x"], COLUMN["patch_y"]]] = track.seen[0, :2] + np.array(track.feet[0])
     assert activity(track, wheel, ["floor_patch"])["floor_patch"]
+
+
+def test_what_two_laws_share_stays_with_the_one_that_is_on(track: Any) -> None:
+    row = table_row(slide_mu=0.05, slide_extent=0.7, load_x=0.1, load_height=0.8, patch_mu=0.1, patch_x=50.0)
+    both = ["ground_friction", "floor_patch"]
+    off = without(track, row, "ground_friction", both)
+    assert off[COLUMN["slide_mu"]] == 0.0 and off[COLUMN["patch_mu"]] == 0.1
+    assert off[COLUMN["load_x"]] == 0.1 and off[COLUMN["load_height"]] == 0.8
+    assert without(track, row, "ground_friction")[COLUMN["load_x"]] == 0.0
+    # A patch that the body never came to does nothing beside friction whose load is uneven.
+    assert activity(track, row, ["floor_patch"], beside=both)["floor_patch"] == ()
 
 
 def test_a_cord_acts_where_it_is_taut(track: Any) -> None:

@@ -16,7 +16,7 @@ from scipy.stats import kstest
 from pbrl_bag import read_recording, write_recording
 from pbrl_bag.types import Recording, WrenchStream
 from pbrl_mismatch import DiagnoseOptions, Diagnosis, MismatchError, diagnose, track_of
-from pbrl_mismatch.diagnose import least_of_two, with_library
+from pbrl_mismatch.diagnose import NOTHING_HELD_OUT, least_of_two, with_library
 from pbrl_mismatch.report import NOTHING_TRIED
 from pbrl_model.errors import ModelError
 
@@ -124,6 +124,35 @@ def test_a_hold_that_was_under_way_when_recording_began_is_left_out_and_said(
     one = diagnose(late, options).objects["table"]
     assert not one.mismatch
     assert any("a hold was under way" in note and "start recording" in note for note in one.notes)
+
+
+def test_an_object_that_cannot_be_diagnosed_is_refused_beside_one_that_can(
+    concealed_recording: Callable[..., Recording], held_twice: Callable[..., Recording]
+) -> None:
+    whole = held_twice(concealed_recording("clean", 3), concealed_recording("clean", 1), 40.0)
+    poses, (first, second) = whole.object_poses["table"], whole.grasps
+    still = np.zeros(len(poses.time), dtype=int)
+    lost = replace(poses, position=poses.position[still], quaternion=poses.quaternion[still])
+    two = replace(
+        whole,
+        bodies={**whole.bodies, "chair": replace(whole.bodies["table"], name="chair")},
+        object_poses={**whole.object_poses, "chair": lost},
+        grasps=(replace(first, object="chair"), second),
+    )
+    options = DiagnoseOptions(without=without_all_but("viscous_drag"), baseline=("free",), **QUICK)
+    found = diagnose(two, options)
+    assert set(found.objects) == {"table"} and set(found.refused) == {"chair"}
+    assert found.to_report()["refused"]["chair"] == found.refused["chair"]
+    assert "chair: expected poses that change" in found.refused["chair"]
+    with pytest.raises((MismatchError, ModelError), match="chair"):
+        diagnose(two, options.model_copy(update={"objects": ("chair", "table")}))
+
+
+def test_a_name_that_no_forecast_was_put_to_says_so(dragged: Recording, found: Diagnosis) -> None:
+    options = DiagnoseOptions(without=without_all_but(*FEW), baseline=("free",), block=12.0, **QUICK)
+    one = diagnose(dragged, options).objects["table"]
+    assert one.effects and one.report["heldout"]["rmse_position_m"]["baseline"] is None
+    assert NOTHING_HELD_OUT in one.notes and NOTHING_HELD_OUT not in found.objects["table"].notes
 
 
 def test_a_soft_hold_is_named_though_the_motion_does_not_show_it(concealed_recording: Callable[..., Recording]) -> None:

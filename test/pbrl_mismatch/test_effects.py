@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,7 @@ CONTRACT = (
     "payload_change sloshing_load tether detent hidden_hinge hidden_obstacle unseen_body external_force "
     "grasp_compliance wrench_bias wrench_frame time_offset pose_bias"
 )
-SCENE = Scene(np.zeros(2), np.ones(2), np.zeros(2), np.array([0.6, 0.35]), 20.0, 10.0, 0.1, 0.0, 20.0)
+SCENE = Scene(np.zeros(2), np.ones(2), np.zeros(2), np.zeros(2), np.array([0.6, 0.35]), 20.0, 10.0, 0.1, 0.0, 20.0)
 
 
 def test_the_names_are_the_contract_s() -> None:
@@ -61,6 +63,14 @@ def test_a_point_of_the_body_is_looked_for_on_the_body_alone() -> None:
     held = hypothesis.believable(draws)[:, [hypothesis.columns.index(name) for name in ("wheel2_x", "wheel2_y")]]
     assert np.all(np.abs(held - SCENE.centroid) <= SCENE.half + 1e-12)
     assert np.isclose(np.abs(held - SCENE.centroid), SCENE.half).any()
+
+
+def test_an_offset_of_the_centre_of_mass_is_from_where_it_was_told_to_be() -> None:
+    # Of a footprint that is not symmetric its box's middle is another point.
+    where = EFFECTS["com_offset"].where
+    place = where and where({"com_x": 0.1, "com_y": 0.0}, replace(SCENE, com=np.array([0.05, -0.02])))
+    assert place is not None
+    np.testing.assert_allclose(place.shape.mean(axis=0), [0.15, -0.02], atol=1e-9)
 
 
 def test_unknown_names_are_told_the_nearest() -> None:

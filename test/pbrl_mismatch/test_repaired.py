@@ -20,7 +20,7 @@ from pbrl_mismatch.repaired import load_repaired, predict_repaired, rows_of, sav
 from pbrl_mismatch.search.fitted import Fitted, cut_stages, fit_baseline, fit_from, scene_of
 from pbrl_mismatch.search.hypothesis import BaselineOptions, Hypothesis, baselines
 from pbrl_mismatch.search.predictive import predictive_test
-from pbrl_mismatch.search.told_baseline import baseline_from_model, is_model_file
+from pbrl_mismatch.search.told_baseline import baseline_from_model, is_model_file, told_baselines
 from pbrl_model.arviz_bridge import save_posterior
 from pbrl_model.model_file import LearnedEffect, SavedModel, posterior_of, save_model
 from pbrl_model.rollout import rollout
@@ -166,6 +166,14 @@ def test_what_the_baseline_has_is_no_mismatch_and_is_kept(
     assert predictive_test(found.peak, 0).p_value > 1e-3
     drag = COLUMN["drag_linear"]
     assert abs(np.log(found.row[drag] / fitted.row[drag])) < 0.1
+    # A model that is repaired on top of a repaired one has what both found.
+    scene = scene_of(track, found.row)
+    made = told.hypothesis.with_effect(EFFECTS["wrench_bias"], scene, 0)
+    twice = saved_model(np.random.default_rng(0), peaked(made, made.mean[None]), track)
+    assert twice.names == ("viscous_drag", "wrench_bias")
+    assert set(twice.effects[0].parameters) == set(saved.effects[0].parameters)
+    save_model(twice, tmp_path / "twice.json")
+    assert baseline_from_model(tmp_path / "twice.json", **SPREADS).effects == twice.names
 
 
 def test_what_a_pin_was_off_its_rest_says_nothing_of_the_next_recording(track: Any, tmp_path: Path) -> None:
@@ -209,6 +217,19 @@ def test_a_file_that_cannot_be_simulated_is_refused(
     with pytest.raises(MismatchError) as caught:
         baseline_from_model(path, **SPREADS)
     assert said in str(caught.value) and str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_models_are_told_of_what_was_held(saved: SavedModel, tmp_path: Path) -> None:
+    save_model(saved, tmp_path / "table.json")
+    save_model(saved.model_copy(update={"object": "chair"}), tmp_path / "chair.json")
+    both = DiagnoseOptions(models=(tmp_path / "table.json", tmp_path / "chair.json"))
+    assert set(told_baselines(["table"], both)) == {"table", "chair"}
+    assert told_baselines(["table"], DiagnoseOptions()) == {}
+    with pytest.raises(MismatchError, match="expected a model of what was held, 'sofa', got one of 'table' and of 'ch"):
+        told_baselines(["sofa"], both)
+    twice = DiagnoseOptions(models=(tmp_path / "table.json", tmp_path / "table.json"))
+    with pytest.raises(MismatchError, match="expected one model of 'table', got a second"):
+        told_baselines(["table"], twice)
 
 
 def test_a_name_of_a_kind_is_no_file(tmp_path: Path) -> None:

@@ -7,6 +7,8 @@ import numpy as np
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 from pbrl_mismatch.unknown.samples import Samples
 
+MASS = 20.0
+
 
 def moments(rng: np.random.Generator, count: int, noise: float) -> Samples:
     """Return a body that wanders about a room, and a wrench of noise."""
@@ -29,7 +31,7 @@ def moments(rng: np.random.Generator, count: int, noise: float) -> Samples:
 def table_row(**values: float) -> np.ndarray:
     """Return a row of a model of a table of 20 kg."""
     row = neutral_row()
-    row[COLUMN["mass"]] = 20.0
+    row[COLUMN["mass"]] = MASS
     for name, value in values.items():
         row[COLUMN[name]] = value
     return row

@@ -9,7 +9,7 @@ difference is what the effect did at that moment. A load that was put on says it
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pbrl_mismatch.data.missing import runs_of
 from pbrl_mismatch.data.residual import accelerations
 from pbrl_mismatch.data.track import Track
+from pbrl_mismatch.effects.effect import Effect, Scene
 from pbrl_mismatch.effects.registry import effect_named
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.kernels.columns import COLUMN, WIDTH, neutral_row
@@ -47,7 +48,7 @@ UNSEEN_IN_FORCE = frozenset({"pose_bias", "time_offset", "grasp_compliance"})
 
 
 def activity(
-    track: Track, row: Array, effects: Sequence[str], *, floor: float = FLOOR
+    track: Track, row: Array, effects: Sequence[str], *, beside: Sequence[str] = (), floor: float = FLOOR
 ) -> dict[str, tuple[Interval, ...] | None]:
     """Return when each effect of a fitted model acts.
 
@@ -55,6 +56,7 @@ def activity(
         track: what was recorded.
         row: (WIDTH,) parameter row of the fitted model, the effects on.
         effects: names of those that are asked about.
+        beside: names of others that are on.
         floor: size below which a wrench does not count [N].
 
     Returns:
@@ -67,11 +69,11 @@ def activity(
     if not (math.isfinite(floor) and floor > 0.0):
         raise MismatchError(f"activity: expected a floor above zero, got {floor}")
     found: dict[str, tuple[Interval, ...] | None] = dict.fromkeys(effects)
-    for name, size in wrench_sizes(track, row, effects).items():
+    for name, size in wrench_sizes(track, row, effects, beside).items():
         if size is not None:
             acting, effect = _counts(size, floor), effect_named(name)
             if effect.touches is not None:
-                acting = _touching(track, row, name, effect.touches[2], acting, floor)
+                acting = _touching(track, row, name, {*effects, *beside}, acting, floor)
             if effect.lasts is not None and acting.any():
                 moment, gone = (row[COLUMN[column]] for column in effect.lasts)
                 acting = (track.clock >= moment) != (gone > 0.0)
@@ -79,13 +81,16 @@ def activity(
     return found
 
 
-def wrench_sizes(track: Track, row: Array, effects: Sequence[str]) -> dict[str, Array | None]:
+def wrench_sizes(
+    track: Track, row: Array, effects: Sequence[str], beside: Sequence[str] = ()
+) -> dict[str, Array | None]:
     """Return how hard each effect of a fitted model acts, (T,) [N]; None for those that no force shows.
 
     Args:
         track: what was recorded, in T steps.
         row: (WIDTH,) parameter row.
         effects: names.
+        beside: names of others that are on.
 
     Raises:
         MismatchError: an effect is unknown, or the row does not fit.
@@ -96,7 +101,7 @@ def wrench_sizes(track: Track, row: Array, effects: Sequence[str]) -> dict[str, 
     found: dict[str, Array | None] = dict.fromkeys(effects)
     if not shown:
         return found
-    rows = np.stack([row, *(without(track, row, name) for name in shown)])
+    rows = np.stack([row, *(without(track, row, name, {*effects, *beside}) for name in shown)])
     rows[:, COLUMN["slide_mu"]] += A_TRACE
     acceleration = accelerations(track, rows, track.seen, 1)
     mass = float(row[COLUMN["mass"]])
@@ -105,20 +110,33 @@ def wrench_sizes(track: Track, row: Array, effects: Sequence[str]) -> dict[str, 
     return found | dict(zip(shown, size, strict=True))
 
 
-def without(track: Track, row: Array, effect: str) -> Array:
+def without(track: Track, row: Array, effect: str, present: Collection[str] = ()) -> Array:
     """Return (WIDTH,) a model's row with one of its effects off, all else as it was fitted.
 
-    One that adds to another, as what holds at rest does to sliding friction, leaves the other on.
+    One that adds to another, as what holds at rest does to sliding friction, leaves the other on; and what it shares
+    with others that are on, as the centre of load that all dry friction goes by, is theirs as well.
+
+    Args:
+        track: what was recorded.
+        row: (WIDTH,) parameter row of the model.
+        effect: name of the one that is off.
+        present: names of those that are on; it may be among them.
     """
     known, scene = effect_named(effect), scene_of(track, row)
-    columns = {parameter.column for parameter in known.parameters(scene)}
-    columns.update(known.fixed, *known.fixed_in.values())
+    columns = _columns(known, scene)
     if known.limit is not None:
-        columns -= {parameter.column for parameter in effect_named(known.limit).parameters(scene)}
+        columns -= _columns(effect_named(known.limit), scene)
+    for other in {*present} - {effect}:
+        columns -= _columns(effect_named(other), scene)
     off, neutral = row.copy(), neutral_row()
     for column in columns:
         off[COLUMN[column]] = neutral[COLUMN[column]]
     return off
+
+
+def _columns(effect: Effect, scene: Scene) -> set[str]:
+    """Return what an effect learns or fixes."""
+    return {parameter.column for parameter in effect.parameters(scene)}.union(effect.fixed, *effect.fixed_in.values())
 
 
 def intervals(track: Track, acting: NDArray[np.bool_]) -> tuple[Interval, ...]:
@@ -143,7 +161,7 @@ def intervals(track: Track, acting: NDArray[np.bool_]) -> tuple[Interval, ...]:
 
 
 def _touching(
-    track: Track, row: Array, name: str, radius: str, acting: NDArray[np.bool_], floor: float
+    track: Track, row: Array, name: str, present: Collection[str], acting: NDArray[np.bool_], floor: float
 ) -> NDArray[np.bool_]:
     """Return (T,) where a contact acts: for as long as the path stays near after, and before, it acts along it.
 
@@ -151,15 +169,18 @@ def _touching(
         track: what was recorded.
         row: (WIDTH,) parameter row.
         name: of the effect.
-        radius: column of the size of what is touched.
+        present: names of the effects that are on.
         acting: (T,) where it acts along the path as that was smoothed.
         floor: see `activity`.
     """
+    touches = effect_named(name).touches
+    assert touches is not None
+    radius = touches[2]
 
     def reached(further: float) -> NDArray[np.bool_]:
         larger = row.copy()
         larger[COLUMN[radius]] += further
-        size = wrench_sizes(track, larger, [name])[name]
+        size = wrench_sizes(track, larger, [name], tuple(present))[name]
         return np.zeros_like(acting) if size is None else size > floor
 
     off = 0.0

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +40,11 @@ from pbrl_mismatch.search.heldout import noise_floor
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
 from pbrl_mismatch.search.posterior import with_draws
 from pbrl_mismatch.search.predictive import Verdict, predictive_test
-from pbrl_mismatch.search.told_baseline import ToldBaseline, baseline_from_model
+from pbrl_mismatch.search.told_baseline import ToldBaseline, told_baselines
 from pbrl_mismatch.search.weigh import Weighed
 from pbrl_mismatch.unknown.describe import describe_unknown
 from pbrl_mismatch.where.localise import localise
+from pbrl_model.errors import ModelError
 from pbrl_model.fitting.episodes import body_of, motions_of, usable_episodes
 from pbrl_model.predict import UNKNOWN_MASS
 from pbrl_model.sensing.wrench_error import wrench_error
@@ -55,6 +56,10 @@ LEAST_FORCE = 1e-9
 LIBRARY_SHARE = 0.1
 """What the library's odds have of the level of the test, beside the test's own."""
 UNKNOWN_MASS_SPREAD = 1.0
+NOTHING_HELD_OUT = (
+    "no push lasts long enough to leave some of it out of the fit: the name rests on the evidence alone, and no "
+    "forecast has put it to the test"
+)
 
 
 @dataclass(frozen=True)
@@ -97,20 +102,30 @@ class ObjectDiagnosis:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found in a recording."""
+    """What was found in a recording.
+
+    Attributes:
+        recording: where it is.
+        objects: what was found on each.
+        seconds: that it took.
+        refused: objects that could not be diagnosed beside those, and why.
+    """
 
     recording: Path
     objects: Mapping[str, ObjectDiagnosis]
     seconds: float
+    refused: Mapping[str, str] = field(default_factory=dict)
 
     def to_report(self) -> dict[str, Any]:
-        """Return `report.json` of the command `diagnose`."""
+        """Return `report.json` of the command `diagnose`; `refused` is in it only where an object was."""
+        refused = {"refused": dict(self.refused)} if self.refused else {}
         pushes = [found.next_push for found in self.objects.values() if found.next_push is not None]
         return {
             "recording": str(self.recording),
             "objects": {name: dict(found.report) for name, found in self.objects.items()},
             "next_experiment": max(pushes, key=lambda each: each.expected_bits).to_report() if pushes else None,
             "seconds": self.seconds,
+            **refused,
         }
 
 
@@ -121,8 +136,11 @@ def diagnose(recording: Recording, options: DiagnoseOptions | None = None) -> Di
         recording: as read.
         options: None: the defaults.
 
+    An object that cannot be diagnosed is refused beside others that can; alone, or where it was asked for, it is an
+    error.
+
     Raises:
-        MismatchError: an object was not held, or nothing was felt while it was.
+        MismatchError: an object was not held, nothing was felt while it was, or no model that was told is of any.
         ModelError: a stream is missing or broken, or an object never moved.
         BagError: an episode is malformed.
     """
@@ -137,15 +155,36 @@ def diagnose(recording: Recording, options: DiagnoseOptions | None = None) -> Di
     names = chosen.objects or held
     if not names:
         raise MismatchError(f"{recording.path}: expected at least one grasp to diagnose, got none")
+    told = told_baselines(names, chosen)
     seeds = np.random.SeedSequence(chosen.seed).spawn(len(names))
-    room = recording.room if len(recording.room) else None
-    objects = {}
+    objects: dict[str, ObjectDiagnosis] = {}
+    refused: dict[str, MismatchError | ModelError] = {}
     for name, each in zip(names, seeds, strict=True):
-        track = track_of(recording, name)
-        found = _diagnose_object(each, track, lay_grips(recording, track), room, chosen)
-        error = wrench_error(recording, track.motions, body_of(recording.bodies[name], track.motions[0].oriented))
-        objects[name] = replace(found, notes=(*found.notes, *_poor_force(error)))
-    return Diagnosis(recording.path, objects, time.perf_counter() - started)
+        try:
+            objects[name] = _diagnosed(each, recording, name, told.get(name), chosen)
+        except (MismatchError, ModelError) as error:
+            if name in chosen.objects:
+                raise
+            refused[name] = error
+    if not objects:
+        raise next(iter(refused.values()))
+    why = {name: str(error) for name, error in refused.items()}
+    return Diagnosis(recording.path, objects, time.perf_counter() - started, why)
+
+
+def _diagnosed(
+    seed: np.random.SeedSequence,
+    recording: Recording,
+    name: str,
+    told: ToldBaseline | None,
+    options: DiagnoseOptions,
+) -> ObjectDiagnosis:
+    """Diagnose one object of a recording; see `diagnose`."""
+    track = track_of(recording, name)
+    room = recording.room if len(recording.room) else None
+    found = _diagnose_object(seed, track, lay_grips(recording, track), room, told, options)
+    error = wrench_error(recording, track.motions, body_of(recording.bodies[name], track.motions[0].oriented))
+    return replace(found, notes=(*found.notes, *_poor_force(error)))
 
 
 def _poor_force(error: float) -> tuple[str, ...]:
@@ -175,20 +214,6 @@ def track_of(recording: Recording, name: str) -> Track:
     track = replace(laid, missing=sound.missing, unheard=unheard)
     check_track(track)
     return track
-
-
-def told_baseline(name: str, options: DiagnoseOptions) -> ToldBaseline | None:
-    """Return the model that was told of an object, or None.
-
-    Raises:
-        ModelError: a file cannot be read.
-        MismatchError: it is of something that cannot be simulated.
-    """
-    told = [
-        baseline_from_model(path, inertia_spread=options.inertia_spread, delay_spread=options.delay_spread)
-        for path in options.models
-    ]
-    return next((each for each in told if each.object == name), None)
 
 
 def fit_baselines(
@@ -242,10 +267,14 @@ def with_library(p_value: float, log_odds: float) -> float:
 
 
 def _diagnose_object(
-    seed: np.random.SeedSequence, track: Track, grips: GripTrack | None, room: Array | None, options: DiagnoseOptions
+    seed: np.random.SeedSequence,
+    track: Track,
+    grips: GripTrack | None,
+    room: Array | None,
+    told: ToldBaseline | None,
+    options: DiagnoseOptions,
 ) -> ObjectDiagnosis:
     first, second, third, fourth = seed.spawn(4)
-    told = told_baseline(track.object, options)
     if told is not None:
         options = options.model_copy(update={"without": (*options.without, *told.effects)})
     stages = cut_stages(track, options)
@@ -284,6 +313,8 @@ def _diagnose_object(
     }
     notes = [sentence(track.object, mismatch, verdict, found), *found.notes, *missing_notes(track)]
     notes += note_on_unheard(track.unheard)
+    if found.effects and baseline.score is None:
+        notes.append(NOTHING_HELD_OUT)
     if mismatch:
         try:
             report["localisation"] = localise(track, baseline.row).to_report()

@@ -49,6 +49,7 @@ def saved_model(
         draws: how many.
     """
     hypothesis, peak = fitted.hypothesis, fitted.peak
+    names = (*hypothesis.told, *hypothesis.effects)
     if fitted.draws is not None:
         chosen = fitted.draws[rng.choice(len(fitted.draws), draws, replace=len(fitted.draws) < draws)]
     else:
@@ -56,8 +57,8 @@ def saved_model(
         unit = rng.standard_normal((draws, len(values)))
         chosen = peak.coordinates[0] + (unit * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
     rows = hypothesis.rows(chosen)
-    owners = {column: name for name in hypothesis.effects for column in _columns(name)}
-    found: dict[str, dict[str, LearnedParameter]] = {name: {} for name in ("", *hypothesis.effects)}
+    owners = {column: name for name in names for column in _columns(name)}
+    found: dict[str, dict[str, LearnedParameter]] = {name: {} for name in ("", *names)}
     for parameter in hypothesis.parameters:
         k = COLUMN[parameter.column]
         told = learned(parameter.unit, rows[:, k], float(fitted.row[k]), positive=parameter.positive)
@@ -66,7 +67,7 @@ def saved_model(
     for column, value, neutral in zip(COLUMNS, hypothesis.base.tolist(), neutral_row().tolist(), strict=True):
         if value != neutral and np.isfinite(value) and column not in hypothesis.columns:
             fixed[owners.get(column, "")][column] = value
-    effects = [LearnedEffect(effect=name, parameters=found[name], fixed=fixed[name]) for name in hypothesis.effects]
+    effects = [LearnedEffect(effect=name, parameters=found[name], fixed=fixed[name]) for name in names]
     return SavedModel(
         object=track.object,
         shape=_shape(track),

@@ -148,8 +148,8 @@ def _finding(weighed: Weighed, effect: Effect, scene: Scene) -> Finding:
     parameters = parameters_of(fitted, {each.column for each in effect.parameters(scene)})
     values = {name: float(entry["mean"]) for name, entry in parameters.items()}
     where = effect.where(values, scene) if effect.where is not None else None
-    track = fitted.peak.objective.cuts.track
-    acts = activity(track, fitted.row, [effect.name])[effect.name]
+    track, present = fitted.peak.objective.cuts.track, (*fitted.hypothesis.told, *fitted.hypothesis.effects)
+    acts = activity(track, fitted.row, [effect.name], beside=present)[effect.name]
     return Finding(
         effect.name,
         weighed.probability,

@@ -25,7 +25,7 @@ from pbrl_mismatch.search.heldout import settle
 from pbrl_mismatch.search.hypothesis import FURTHEST, BaselineOptions, baselines
 from pbrl_mismatch.search.objective import Objective
 
-SCENE = Scene(np.zeros(2), np.ones(2), np.zeros(2), np.array([0.4, 0.7]), 30.0, 10.0, 0.1, 0.0, 30.0)
+SCENE = Scene(np.zeros(2), np.ones(2), np.zeros(2), np.zeros(2), np.array([0.4, 0.7]), 30.0, 10.0, 0.1, 0.0, 30.0)
 EXACT: dict[str, tuple[int, Any]] = {
     "ground_friction": (0, {NAME: {"friction": 0.08}}),
     "viscous_drag": (0, {NAME: {"damping": 80.0}}),

@@ -25,7 +25,7 @@ OPTIONS = DiagnoseOptions()
 BIAS = np.array([0.4, 3.0, 0.2])
 """Of the sensor, in its own axes [N, N, N m]."""
 ONSET = 1
-SCENE = Scene(np.zeros(2), np.ones(2), np.zeros(2), np.array([0.6, 0.35]), 20.0, 10.0, 0.1, 0.0, 30.0)
+SCENE = Scene(np.zeros(2), np.ones(2), np.zeros(2), np.zeros(2), np.array([0.6, 0.35]), 20.0, 10.0, 0.1, 0.0, 30.0)
 
 
 @pytest.fixture(scope="module")

@@ -63,8 +63,8 @@ def diagnose(
     baseline: Annotated[
         list[str] | None,
         typer.Option(
-            help="What is no mismatch: free, caster (one that is locked), wheel, ground, wheel+ground or hinge; as "
-            "often as needed, the best counts. Default: free, caster and wheel."
+            help="What is no mismatch: free, caster (one that is locked), wheel, ground, wheel+ground or hinge; or a "
+            "model's file of fit or diagnose. As often as needed, the best counts. Default: free, caster and wheel."
         ),
     ] = None,
     without: Annotated[

@@ -201,6 +201,8 @@ def write_found(found: Diagnosis, recording: Recording, folder: Path, asked_for:
 
 def print_diagnosis(diagnosis: Diagnosis) -> None:
     """Print the verdict on every object, the likeliest hypotheses, and what must not be read into them."""
+    for why in diagnosis.refused.values():
+        output().print(f"not diagnosed: {why}")
     for name, found in diagnosis.objects.items():
         for note in found.notes:
             output().print(note)

@@ -40,6 +40,8 @@ def told_of_all(report: Mapping[str, Any]) -> Told:
         report: `report.json`; keys may be missing.
     """
     found: Told = []
+    if report.get("refused"):
+        found.append(("What could not be diagnosed", sentences(list(report["refused"].values()))))
     if report.get("next_experiment"):
         found.append(("The next push to make", [experiment(report["next_experiment"])]))
     if report.get("not_shown"):

@@ -16,7 +16,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 
 def where(values: Values, scene: Scene) -> Where | None:
     """Return the place that it has."""
-    return disc("body", float(scene.centroid[0]) + values["com_x"], float(scene.centroid[1]) + values["com_y"], 0.05)
+    return disc("body", float(scene.com[0]) + values["com_x"], float(scene.com[1]) + values["com_y"], 0.05)
 
 
 EFFECT = Effect(

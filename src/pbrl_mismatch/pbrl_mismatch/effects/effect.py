@@ -77,7 +77,8 @@ class Scene:
     Attributes:
         middle: (2,) of the floor that the body swept [m].
         reach: (2,) half the sides of the swept floor's bounding box [m].
-        centroid: (2,) of the footprint in the body's frame [m].
+        centroid: (2,) middle of the footprint's bounding box in the body's frame [m].
+        com: (2,) nominal centre of mass in the body's frame [m].
         half: (2,) half the sides of the footprint's bounding box [m].
         mass: of the body as it was told, or else as the baseline has it [kg].
         force: root mean square of the force felt [N].
@@ -89,6 +90,7 @@ class Scene:
     middle: Array
     reach: Array
     centroid: Array
+    com: Array
     half: Array
     mass: float
     force: float

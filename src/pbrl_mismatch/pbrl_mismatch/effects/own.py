@@ -35,7 +35,7 @@ Law = Callable[[float, Triple, Triple, tuple[float, ...]], Triple]
 the wrench (fx, fy, tau) on the body at the origin of its frame, world axes [N, N, N m]."""
 
 _as_tuple: Any = to_fixed_tuple
-NOMINAL = Scene(np.zeros(2), np.ones(2), np.zeros(2), np.array([0.5, 0.3]), 20.0, 10.0, 0.1, 0.0, 30.0)
+NOMINAL = Scene(np.zeros(2), np.ones(2), np.zeros(2), np.zeros(2), np.array([0.5, 0.3]), 20.0, 10.0, 0.1, 0.0, 30.0)
 """A scene in which a law is tried before it is taken."""
 TRIED, FACTOR, ALIKE = 64, 1.7, 1e-6
 """Draws of the prior for that; factor of the strengths; how exactly the wrench must follow."""
@@ -67,8 +67,9 @@ class OwnEffect:
         summary: one sentence.
         law: see `Law`; a plain function of numbers that numba can compile.
         units: unit of each parameter, in the order in which the law takes them.
-        priors: what is believed of each parameter, given the scene: middle and reach of the swept floor, the
-            footprint's centroid and half its sides, mass, force and speed that occurred, start and length in seconds.
+        priors: what is believed of each parameter, given the scene: middle and reach of the swept floor, middle of the
+            footprint's box, centre of mass and half the box's sides, mass, force and speed that occurred, start and
+            length in seconds.
         strength: parameters that the wrench is proportional to, all together: zero is no effect.
         equation: the law, as text.
         shows: which motion shows it.

@@ -196,6 +196,7 @@ def scene_of(track: Track, row: Array) -> Scene:
         middle=0.5 * (low + high),
         reach=0.5 * (high - low) + size,
         centroid=0.5 * (lower + upper),
+        com=track.body[1:3],
         half=half,
         mass=float(row[COLUMN["mass"]]) if math.isnan(track.nominal_mass) else track.nominal_mass,
         force=max(float(np.sqrt(np.mean(force**2))), 0.5),

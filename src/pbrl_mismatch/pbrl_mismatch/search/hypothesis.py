@@ -47,12 +47,14 @@ class Hypothesis:
         variant: which sub-model, for people: the baseline's kind and those of the effects.
         parameters: free columns.
         base: (WIDTH,) values of all others.
+        told: effects that the baseline has from a model that was told; they are no mismatch.
     """
 
     effects: tuple[str, ...]
     variant: str
     parameters: tuple[Parameter, ...]
     base: Array
+    told: tuple[str, ...] = ()
 
     @property
     def columns(self) -> tuple[str, ...]:

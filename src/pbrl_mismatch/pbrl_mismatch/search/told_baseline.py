@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from pbrl_mismatch.effects.effect import Parameter
 from pbrl_mismatch.effects.hidden_hinge import AT_REST
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
+from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.repaired import load_repaired, rows_of
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_model.arviz_bridge import load_posterior
@@ -59,6 +61,27 @@ class ToldBaseline:
 def is_model_file(text: str) -> bool:
     """Tell whether a `--baseline` names a file and not a kind of body."""
     return Path(text).suffix in MODEL_FILES
+
+
+def told_baselines(names: Collection[str], options: DiagnoseOptions) -> dict[str, ToldBaseline]:
+    """Return the models that were told of objects, by object; models of other objects are for other recordings.
+
+    Raises:
+        ModelError: a file cannot be read.
+        MismatchError: it is of something that cannot be simulated, two are of one object, or none is of any of these.
+    """
+    told: dict[str, ToldBaseline] = {}
+    for path in options.models:
+        each = baseline_from_model(path, inertia_spread=options.inertia_spread, delay_spread=options.delay_spread)
+        if each.object in told:
+            raise MismatchError(f"{path}: expected one model of {each.object!r}, got a second; leave one out")
+        told[each.object] = each
+    if told and not {*told} & {*names}:
+        raise MismatchError(
+            f"baseline: expected a model of what was held, {' or '.join(map(repr, names))}, got one of "
+            f"{' and of '.join(map(repr, told))}"
+        )
+    return told
 
 
 def baseline_from_model(path: Path, *, inertia_spread: float, delay_spread: float) -> ToldBaseline:
@@ -128,4 +151,4 @@ def _finished(
     for parameter in parameters:
         base[COLUMN[parameter.column]] = parameter.centre
     told = " + ".join(("told", *effects))
-    return ToldBaseline(name, Hypothesis((), told, tuple(parameters), base), effects)
+    return ToldBaseline(name, Hypothesis((), told, tuple(parameters), base, effects), effects)
