@@ -127,6 +127,31 @@ def test_what_is_already_in_the_model_is_left_out(track: Any, ground: Fitted) ->
     assert [each.effect for each in found] == ["floor_slope"]
 
 
+def test_an_effect_is_added_to_a_model_that_is_else_what_it_was(
+    track: Any, ground: Fitted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A round second wheel has its friction across fixed: it was tested without, so that everything seemed to show.
+    scene, cuts = scene_of(track, ground.row), ground.peak.objective.cuts.take(np.arange(1))
+    wheel = ground.hypothesis.with_effect(EFFECTS["second_wheel"], scene, 0)
+    with_wheel = Fitted(wheel, climb(Objective(wheel, cuts, FLOOR), wheel.mean[None], iterations=1), None)
+    tried = []
+    monkeypatch.setattr(Sensitivity, "noncentrality", lambda self, rows: tried.append(rows) or np.ones(len(rows)))
+    for name in ("floor_slope", "breakaway_friction", "com_offset"):
+        tried.clear()
+        detectable(np.random.default_rng(0), with_wheel, (name,), draws=2)
+        own = [COLUMN[column] for free in EFFECTS[name].variants for column in free]
+        others = np.setdiff1d(np.arange(len(ground.row)), own)
+        assert tried
+        for rows in tried:
+            np.testing.assert_array_equal(rows[:, others], np.tile(with_wheel.row[others], (2, 1)))
+    # What moves the middle of a footprint that is not known exactly is an offset none the less.
+    unsure = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.005, 0.0, 0.01), ["free"], np.zeros(2), np.ones(2), None)[0]
+    of_unsure = Fitted(unsure, climb(Objective(unsure, cuts, FLOOR), unsure.mean[None], iterations=1), None)
+    detectable(np.random.default_rng(0), of_unsure, ("com_offset",), draws=2)
+    assert np.all(tried[-1][:, COLUMN["com_x"]] != of_unsure.row[COLUMN["com_x"]])
+    np.testing.assert_array_equal(tried[-1][:, COLUMN["inertia_factor"]], of_unsure.row[COLUMN["inertia_factor"]])
+
+
 def test_strengths_scale_from_nothing(track: Any, ground: Fitted) -> None:
     scene = scene_of(track, ground.row)
     assert set(STRENGTHS) == set(EFFECTS) == set(DiagnoseOptions().effects)

@@ -26,7 +26,7 @@ from pbrl_mismatch.effects.grasp_compliance import PARAMETERS as HOLD
 from pbrl_mismatch.effects.registry import EFFECTS, effect_named
 from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.observability.power import needed, power
-from pbrl_mismatch.observability.strengths import rounded, scaled, size_of, strength_columns, unit_of, without_others
+from pbrl_mismatch.observability.strengths import laid_on, rounded, scaled, size_of, strength_columns, unit_of
 from pbrl_mismatch.search.fitted import Fitted, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence
 from pbrl_mismatch.search.objective import START, Linear, reduce
@@ -215,9 +215,7 @@ def _variant(
     columns = strength_columns(name, free)
     rows = hypothesis.rows(hypothesis.sample_prior(rng, PRIOR_DRAWS))
     plausible = float(np.quantile(size_of(rows, columns), PLAUSIBLE))
-    rows = without_others(rows[:draws], name)
-    for column in ground.hypothesis.columns:
-        rows[:, COLUMN[column]] = ground.row[COLUMN[column]]
+    rows = laid_on(ground.row, rows[:draws], name, variant, ground.hypothesis.columns)
     target = needed(len(free), level, wanted)
     found = shows(rows)
     chance = float(np.mean(power(found, len(free), level)))

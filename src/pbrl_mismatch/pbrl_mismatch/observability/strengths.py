@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -71,13 +71,25 @@ def scaled(rows: Array, columns: Sequence[str], factor: Array) -> Array:
     return out
 
 
-def without_others(rows: Array, effect: str) -> Array:
-    """Return rows (P, WIDTH) in which the strengths of other effects, which an effect's law may hold too, are off."""
-    own, out = _strengths(effect), rows.copy()
-    for columns in STRENGTHS.values():
-        for column in columns:
-            if column not in own:
-                out[:, COLUMN[column]] = _NEUTRAL[COLUMN[column]]
+def laid_on(row: Array, rows: Array, name: str, variant: int, taken: Collection[str]) -> Array:
+    """Return rows (P, WIDTH) of a model that has one effect more, and is else what it was.
+
+    Strengths of other effects, which an effect's law may hold too, stay the model's. So does what is free in both,
+    unless it is what makes this effect strong.
+
+    Args:
+        row: (WIDTH,) of the model.
+        rows: (P, WIDTH) that have the effect.
+        name: of the effect.
+        variant: of it.
+        taken: columns that are free in the model.
+    """
+    effect, strengths = effect_named(name), set(_strengths(name))
+    others = {column for columns in STRENGTHS.values() for column in columns} | set(taken)
+    own = [*effect.variants[variant], *effect.given(variant)]
+    kept = [COLUMN[column] for column in own if column in strengths or column not in others]
+    out = np.tile(row, (len(rows), 1))
+    out[:, kept] = rows[:, kept]
     return out
 
 
