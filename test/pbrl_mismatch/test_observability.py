@@ -166,6 +166,21 @@ def test_strengths_scale_from_nothing(track: Any, ground: Fitted) -> None:
             assert np.all(size_of(scaled(rows, columns, np.full(4, 2.0)), columns) > size_of(rows, columns))
 
 
+def test_a_patch_of_no_strength_does_nothing_to_a_wheel_either(track: Any, ground: Fitted) -> None:
+    scene, cuts = scene_of(track, ground.row), ground.peak.objective.cuts.take(np.arange(2))
+    wheel = baselines(BaselineOptions(20.0, 0.1, 0.1, 0.005), ["wheel"], np.zeros(2), np.array([0.6, 0.35]), None)[0]
+    fitted = Fitted(wheel, climb(Objective(wheel, cuts, FLOOR), wheel.mean[None], iterations=1), None)
+    patch = wheel.with_effect(EFFECTS["floor_patch"], scene, 0)
+    rows = np.tile(fitted.row, (2, 1))
+    for parameter in patch.parameters[len(wheel.parameters) :]:
+        rows[:, COLUMN[parameter.column]] = parameter.centre
+    rows[:, [COLUMN["patch_x"], COLUMN["patch_y"]]] = track.seen[0, :2]
+    rows[:, COLUMN["patch_roll"]] = 1.0
+    columns = strength_columns("floor_patch", EFFECTS["floor_patch"].variants[0])
+    strong, none = Sensitivity(fitted).noncentrality(scaled(rows, columns, np.array([1.0, 0.0])))
+    assert strong > 1.0 and none == 0.0
+
+
 def test_bad_input_is_refused(ground: Fitted) -> None:
     with pytest.raises(MismatchError, match="power"):
         needed(2, 0.05, 0.01)

@@ -21,7 +21,7 @@ STRENGTHS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "ground_friction": ("slide_mu",),
         "breakaway_friction": ("breakaway_mu",),
         "viscous_drag": ("drag_linear", "drag_turn"),
-        "floor_patch": ("patch_mu",),
+        "floor_patch": ("patch_mu", "patch_roll"),
         "floor_slope": ("slope_x", "slope_y"),
         "com_offset": ("com_x", "com_y"),
         "payload_change": ("payload_mass",),
