@@ -111,6 +111,16 @@ def test_a_clean_recording_is_clean(concealed_recording: Callable[..., Recording
     assert "agree" in one.notes[0]
 
 
+def test_what_could_not_have_shown_is_told_at_the_level_of_the_test(dragged: Recording) -> None:
+    few, told = without_all_but("detent"), []
+    for level in (0.05, 1e-6):
+        options = DiagnoseOptions(without=few, baseline=("free",), level=level, **QUICK)
+        told.append(diagnose(dragged, options).objects["table"].report["not_shown"])
+    # A test that alarms more seldom notices less; of what does nothing, one at 5 % notices one in twenty.
+    (often,), (seldom,) = told
+    assert often["effect"] == seldom["effect"] == "detent" and seldom["chance"] < often["chance"] - 0.04
+
+
 def test_a_hold_that_was_under_way_when_recording_began_is_left_out_and_said(
     concealed_recording: Callable[..., Recording], held_twice: Callable[..., Recording]
 ) -> None:

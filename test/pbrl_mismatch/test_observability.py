@@ -181,6 +181,10 @@ def test_a_patch_of_no_strength_does_nothing_to_a_wheel_either(track: Any, groun
     assert strong > 1.0 and none == 0.0
 
 
+def test_a_test_that_always_alarms_hides_nothing(ground: Fitted) -> None:
+    assert could_not_show(np.random.default_rng(0), ground, ("detent",), level=0.97) == ()
+
+
 def test_bad_input_is_refused(ground: Fitted) -> None:
     with pytest.raises(MismatchError, match="power"):
         needed(2, 0.05, 0.01)

@@ -299,6 +299,7 @@ def _diagnose_object(
     named = found.effects[0].fitted if found.effects else baseline
     left = _unexplained(baseline, weighed[0].fitted if weighed else baseline)
     absent = [name for name in options.effects if name not in named.hypothesis.effects]
+    hidden = could_not_show(rng, named, absent, grip, options.workers, level=options.level)
     report = {
         "mismatch": mismatch,
         "p_value": verdict.p_value,
@@ -307,7 +308,7 @@ def _diagnose_object(
         "unexplained_fraction": left,
         "unknown": mismatch and not found.effects,
         "heldout": held_out_report(baseline, named, floor),
-        "not_shown": [each.to_report() for each in could_not_show(rng, named, absent, grip, options.workers)],
+        "not_shown": [each.to_report() for each in hidden],
         "unknown_description": None,
         "localisation": None,
     }

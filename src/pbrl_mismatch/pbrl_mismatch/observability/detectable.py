@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 DRAWS = 12
 PLAUSIBLE = 0.95
 """Quantile of the prior's strength up to which an effect is plausible."""
+WANTED = 0.95
+"""Share of recordings in which an effect of the smallest strength is noticed."""
 NOWHERE = 0.1
 """A chance of being noticed below this is next to that of a false alarm."""
 PRIOR_DRAWS = 400
@@ -108,8 +110,10 @@ def could_not_show(
         effects: names; None: all of the library that are not in `ground`.
         grip: what the grippers' poses say; None where that is nothing.
         workers: threads; the result does not depend on how many.
-        level: of false alarms of the test.
+        level: of false alarms of the test; one that alarms nearly always hides nothing.
     """
+    if level >= WANTED:
+        return ()
     found = [each for each in detectable(rng, ground, effects, grip, workers, level=level) if not each.shown]
     return tuple(sorted(found, key=lambda each: (each.chance, each.effect)))
 
@@ -122,7 +126,7 @@ def detectable(
     workers: int = 1,
     *,
     level: float = 0.05,
-    wanted: float = 0.95,
+    wanted: float = WANTED,
     draws: int = DRAWS,
 ) -> tuple[Detectable, ...]:
     """Return what the recording could have shown of each effect; its most visible variant counts.
