@@ -15,6 +15,7 @@ from pbrl_mismatch.activity import activity
 from pbrl_mismatch.effects.effect import Effect, Scene, Where
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.kernels.columns import COLUMN
+from pbrl_mismatch.moments import moments_of
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.predictive import Verdict, predictive_test
 from pbrl_mismatch.search.weigh import NAMED, Weighed, held_by
@@ -212,12 +213,7 @@ def parameters_of(fitted: Fitted, columns: set[str] | None = None) -> dict[str, 
         if columns is not None and parameter.column not in columns:
             continue
         value, variance = float(fitted.peak.coordinates[0, k]), float(covariance[k, k])
-        if parameter.positive:
-            variance = min(variance, 4.0)
-            mean = math.exp(value + 0.5 * variance)
-            sd = mean * math.sqrt(math.expm1(variance))
-        else:
-            mean, sd = value, math.sqrt(variance)
+        mean, sd = moments_of(value, variance, parameter.positive)
         out[parameter.column] = {"mean": mean, "sd": sd, "unit": parameter.unit}
     return out
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -32,6 +33,24 @@ def test_a_catch_is_named_and_placed_within_its_uncertainty(at: float, width: fl
     where = found.report["effects"][0]["where"]
     assert where["frame"] == "joint" and where["shape"][0][0] < math.radians(at) < where["shape"][1][0]
     assert found.blocks.rmse_after < 0.6 * found.blocks.rmse_before
+
+
+def test_a_stiff_stretch_is_told_with_its_place_and_a_width_with_the_mean_of_what_is_above_zero() -> None:
+    angle = opened()
+    stiff = 4.0 * ((angle > math.radians(20.0)) & (angle < math.radians(28.0)))
+    pull = pulled(0.6 + stiff + noise(np.random.default_rng(5), angle), angle)
+    others = tuple(dict.fromkeys(law.effect for law in LAWS if law.effect != "floor_patch"))
+    found = diagnose_pull(np.random.default_rng(0), pull, OPTIONS.model_copy(update={"without": others}))
+    assert [each.effect for each in found.effects] == ["floor_patch"]
+    told = re.search(r"floor_patch at (\S+) ± \S+ degrees left out", found.notes[0])
+    assert told is not None and float(told[1]) == pytest.approx(20.0, abs=1.0)
+    best = found.repaired
+    k = [each.name for each in best.problem.unknowns].index("patch_width")
+    value, spread = float(best.values[k]), math.sqrt(best.covariance[k, k])
+    width = found.effects[0].parameters["patch_width"]
+    assert width["mean"] == pytest.approx(value * math.exp(0.5 * spread**2), rel=1e-9)
+    draws = value * np.exp(spread * np.random.default_rng(1).standard_normal(100_000))
+    assert width["sd"] == pytest.approx(draws.std(), rel=0.02)
 
 
 def test_p_values_of_doors_without_a_catch_are_uniform() -> None:

@@ -14,6 +14,7 @@ from pbrl_mismatch.joint.evidence import Explained
 from pbrl_mismatch.joint.heldout import FIRST, HeldOut
 from pbrl_mismatch.joint.laws import ALIKE, Law
 from pbrl_mismatch.joint.pull import Pull
+from pbrl_mismatch.moments import moments_of
 
 Array = NDArray[np.float64]
 
@@ -61,21 +62,22 @@ def finding_of(explained: Explained, law: Law, probability: float) -> Finding:
     """Return what a fitted hypothesis says of one of its laws."""
     pull, hypothesis = explained.problem.pull, explained.hypothesis
     parameters: dict[str, dict[str, float | str]] = {}
+    fitted: dict[str, float] = {}
     own = {each.name for each in law.unknowns(pull)}
     for k, unknown in enumerate(explained.problem.unknowns):
         if unknown.name in own:
-            value, variance = float(explained.values[k]), float(explained.covariance[k, k])
-            sd = value * math.sqrt(math.expm1(min(variance, 4.0))) if unknown.positive else math.sqrt(variance)
+            fitted[unknown.name] = value = float(explained.values[k])
+            coordinate = math.log(value) if unknown.positive else value
+            mean, sd = moments_of(coordinate, float(explained.covariance[k, k]), unknown.positive)
             if unknown.name.endswith(ANGLE):
                 sd = math.hypot(sd, value * pull.hinge.sd[2] / pull.hinge.radius)
-            parameters[unknown.name] = {"mean": value, "sd": sd, "unit": unknown.unit}
+            parameters[unknown.name] = {"mean": mean, "sd": sd, "unit": unknown.unit}
     means, sds = explained.solved.moments(explained.problem.positive)
     named = {each.name for each in law.strengths(pull)}
     for strength, mean, sd in zip(hypothesis.strengths(pull), means.tolist(), sds.tolist(), strict=True):
         if strength.name in named:
             parameters[strength.name] = {"mean": mean, "sd": sd, "unit": strength.unit}
-    values = {name: float(entry["mean"]) for name, entry in parameters.items()}
-    place = law.place(values) if law.place is not None else None
+    place = law.place(fitted) if law.place is not None else None
     when = None
     if place is not None:
         low, high = max(place[0], float(pull.angle.min())), min(place[1], float(pull.angle.max()))
@@ -161,8 +163,7 @@ def sentence(pull: Pull, chance: float, mismatch: bool, effects: Sequence[Findin
         return f"{pull.object}: something is left out (p = {chance:.2g}), and it is none of what the library knows"
     told = []
     for each in effects:
-        at = f"{each.effect}_angle"
-        where = each.parameters.get(at)
+        where = next((entry for name, entry in each.parameters.items() if name.endswith(ANGLE)), None)
         spot = ""
         if where is not None:
             mean, sd = math.degrees(float(where["mean"])), math.degrees(float(where["sd"]))
