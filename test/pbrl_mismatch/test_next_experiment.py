@@ -131,12 +131,14 @@ def one_push(speed: float, duration: float) -> Candidates:
     )
 
 
-def pushed(track: Any, row: np.ndarray, push: Candidates, hand: np.ndarray, segments: int = SEGMENTS) -> np.ndarray:
+def pushed(
+    track: Any, row: np.ndarray, push: Candidates, hand: np.ndarray, segments: int = SEGMENTS, began: float = 0.0
+) -> np.ndarray:
     """Return (segments, CHANNELS) of one push straight ahead of a body that faces along x."""
     last = len(track.clock) - 1
     out = np.empty((1, 1, segments, CHANNELS))
     push_all(
-        row[None], push.contact, push.normal, push.direction, push.speed, push.duration, np.zeros(6), 0.0, track.seen,
+        row[None], push.contact, push.normal, push.direction, push.speed, push.duration, np.zeros(6), began, track.seen,
         np.array([last, 0, 0, last]), np.zeros(3), track.body, track.outline, track.feet, hand, out,
     )  # fmt: skip
     return out[0, 0]
@@ -165,6 +167,24 @@ def test_a_sensor_s_bias_is_felt_and_moves_nothing(track: Any, hypotheses: tuple
     hand, push = hand_of(hypotheses[0], track, Reach()), one_push(0.1, 2.0)
     plain, biased = (pushed(track, table_row(**values), push, hand) for values in ({}, {"bias_x": 1.0, "bias_y": 0.5}))
     np.testing.assert_allclose(biased - plain, np.tile([0, 0, 0, 1.0, 0.5, 0.0], (SEGMENTS, 1)), atol=1e-9)
+
+
+@pytest.mark.parametrize("began", [5.0, 1.7e9])
+def test_a_sensor_s_fault_is_what_it_is_since_it_was_read_at_rest(
+    track: Any, hypotheses: tuple[Weighed, ...], began: float
+) -> None:
+    hand, push = hand_of(hypotheses[0], track, Reach()), one_push(0.1, 2.0)
+
+    def added(**fault: float) -> np.ndarray:
+        plain, wrong = (pushed(track, table_row(**each), push, hand, began=began) for each in ({}, fault))
+        return (wrong - plain)[:, 3]
+
+    middles = (np.arange(SEGMENTS) + 0.5) * 2.0 / SEGMENTS
+    np.testing.assert_allclose(added(drift_x=0.3), 0.3 * middles, atol=0.3 * track.dt)
+    # An offset that came on before the hand let go is known; one that comes on half-way through the push is not.
+    np.testing.assert_allclose(added(bias_x=2.0, bias_start=began - 3.0), 0.0, atol=1e-9)
+    on = added(bias_x=2.0, bias_start=began + 1.0)
+    np.testing.assert_allclose([*on[:2], *on[-2:]], [0.0, 0.0, 2.0, 2.0], atol=1e-9)
 
 
 def test_an_open_hand_never_pulls(track: Any, hypotheses: tuple[Weighed, ...]) -> None:

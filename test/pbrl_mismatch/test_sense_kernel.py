@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 from kernel_bench import DT, pushed, speeds
 from pushed_table import MASS
 
 from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
+from pbrl_mismatch.kernels.sense_kernel import acting, feel
 
 
 def test_faults_of_the_force_sensor_are_undone(bench: Any) -> None:
@@ -40,6 +42,22 @@ def test_an_offset_acts_from_its_moment_on_and_one_from_before_the_grasp_is_know
     # It comes on over some steps, as much before its moment as after.
     np.testing.assert_allclose(speeds(later)[-1], speeds(plain)[-1], atol=1e-3)
     np.testing.assert_allclose(bench(pushed(10.0)).run(**law, bias_start=-1.0), plain, atol=1e-12)
+
+
+@pytest.mark.parametrize("clock", [2.0, 1.7e9])
+def test_what_a_sensor_says_of_a_force_is_taken_for_that_force(clock: float) -> None:
+    rng, row, com, felt, found = np.random.default_rng(0), neutral_row(), np.zeros(2), np.empty((1, 3)), np.empty(3)
+    faults = ("bias_x", "bias_y", "bias_torque", "drift_x", "drift_y", "drift_torque", "sensor_turn")
+    for came_on, torque_scale in ((-np.inf, 0.7), (clock - 5.0, -1.0), (clock - 0.2, 1.2), (clock + 0.01, -1.0)):
+        row[[COLUMN[name] for name in faults]] = rng.standard_normal(len(faults))
+        row[[COLUMN["force_scale"], COLUMN["torque_scale"], COLUMN["bias_start"]]] = 1.3, torque_scale, came_on
+        heading, force = 0.8, rng.standard_normal(3)
+        c, s = np.cos(heading), np.sin(heading)
+        feel(row, force, c, s, clock, 0.5, felt[0])
+        # The sensor sits at the centre of mass: its force makes no moment there.
+        mount, seen = np.array([[c, s, 0.0, 0.0, 0.5]]), np.array([[0.0, 0.0, heading, 0.0, 0.0, 0.0]])
+        acting(row, felt, mount, seen, 0, 0, 0, clock, np.array([0.1, 0.0, 0.0, DT]), com, found)
+        np.testing.assert_allclose(found, force, atol=1e-12)
 
 
 def test_time_offset_shifts_the_wrench(bench: Any) -> None:

@@ -52,6 +52,44 @@ def load_now(p: Array, time: float, body: Array, com: Array) -> tuple[float, flo
 
 
 @njit(**LEAF, forceinline=True)
+def offset(p: Array, time: float, since: float) -> tuple[float, float, float]:
+    """Return what a sensor reads too much, in its axes [N, N, N m], `since` seconds after it was read at rest.
+
+    One that came on before it was read at rest is known, and taken off.
+    """
+    on = 1.0
+    if p[at.BIAS_START] > -math.inf:
+        on = between(time, p[at.BIAS_START], math.inf) - between(time - since, p[at.BIAS_START], math.inf)
+    return (
+        on * p[at.BIAS_X] + p[at.DRIFT_X] * since,
+        on * p[at.BIAS_Y] + p[at.DRIFT_Y] * since,
+        on * p[at.BIAS_TORQUE] + p[at.DRIFT_TORQUE] * since,
+    )
+
+
+@njit(**LEAF, forceinline=True)
+def feel(p: Array, force: Array, c: float, s: float, time: float, since: float, out: Array) -> None:
+    """Write what the sensor says (3,) of a force and torque at it (3,) in world axes: `acting`, the other way round.
+
+    Args:
+        p: (WIDTH,) parameter row.
+        force: (3,) [N, N, N m].
+        c: cosine of the sensor's turn, as it is believed to be.
+        s: sine of it.
+        time: [s].
+        since: how long ago it was read at rest [s].
+        out: (3,) written.
+    """
+    tc, ts = math.cos(p[at.SENSOR_TURN]), math.sin(p[at.SENSOR_TURN])
+    bx, by = c * force[0] + s * force[1], -s * force[0] + c * force[1]
+    torque_scale = p[at.TORQUE_SCALE] if p[at.TORQUE_SCALE] > 0.0 else p[at.FORCE_SCALE]
+    ox, oy, turning = offset(p, time, since)
+    out[0] = p[at.FORCE_SCALE] * (tc * bx - ts * by) + ox
+    out[1] = p[at.FORCE_SCALE] * (ts * bx + tc * by) + oy
+    out[2] = torque_scale * force[2] + turning
+
+
+@njit(**LEAF, forceinline=True)
 def acting(
     p: Array,
     felt: Array,
@@ -87,13 +125,10 @@ def acting(
         before = min(math.floor(place), last - 1) if last > first else first
         share = place - before if last > first else 0.0
     after = min(before + 1, last)
-    on, since = 1.0, mount[t, 4]
-    if p[at.BIAS_START] > -math.inf:
-        on = between(time, p[at.BIAS_START], math.inf) - between(time - since, p[at.BIAS_START], math.inf)
-    fx = felt[before, 0] + share * (felt[after, 0] - felt[before, 0]) - on * p[at.BIAS_X] - p[at.DRIFT_X] * since
-    fy = felt[before, 1] + share * (felt[after, 1] - felt[before, 1]) - on * p[at.BIAS_Y] - p[at.DRIFT_Y] * since
-    tau = felt[before, 2] + share * (felt[after, 2] - felt[before, 2])
-    tau -= on * p[at.BIAS_TORQUE] + p[at.DRIFT_TORQUE] * since
+    ox, oy, turning = offset(p, time, mount[t, 4])
+    fx = felt[before, 0] + share * (felt[after, 0] - felt[before, 0]) - ox
+    fy = felt[before, 1] + share * (felt[after, 1] - felt[before, 1]) - oy
+    tau = felt[before, 2] + share * (felt[after, 2] - felt[before, 2]) - turning
     torque_scale = p[at.TORQUE_SCALE] if p[at.TORQUE_SCALE] > 0.0 else p[at.FORCE_SCALE]
     fx, fy, tau = fx / p[at.FORCE_SCALE], fy / p[at.FORCE_SCALE], tau / torque_scale
     pc, ps = mount[t, 0], mount[t, 1]

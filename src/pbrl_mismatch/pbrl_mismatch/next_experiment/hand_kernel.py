@@ -17,7 +17,7 @@ from pbrl_bag.kernel_options import LEAF
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.kernels.friction_kernel import FOOT
 from pbrl_mismatch.kernels.motion_kernel import rehearse
-from pbrl_mismatch.kernels.sense_kernel import as_seen, load_now, to_truth
+from pbrl_mismatch.kernels.sense_kernel import as_seen, feel, load_now, to_truth
 from pbrl_mismatch.kernels.state import SLOSH, STATE, UNSEEN
 from pbrl_mismatch.kernels.step_kernel import fixed_axes, step_body
 from pbrl_model.kernel import cos_sin
@@ -59,17 +59,6 @@ def hold_back(force: Array, normal: Array, c: float, s: float, hand: Array) -> N
         force[0] *= hand[MOST_FORCE] / size
         force[1] *= hand[MOST_FORCE] / size
     force[2] = max(-hand[MOST_TORQUE], min(hand[MOST_TORQUE], force[2]))
-
-
-@njit(**LEAF, forceinline=True)
-def feel(p: Array, force: Array, c: float, s: float, time: float, out: Array) -> None:
-    """Write what the sensor says (3,) of a force and torque at it (3,) in world axes: `acting`, the other way round."""
-    tc, ts = math.cos(p[at.SENSOR_TURN]), math.sin(p[at.SENSOR_TURN])
-    bx, by = c * force[0] + s * force[1], -s * force[0] + c * force[1]
-    torque_scale = p[at.TORQUE_SCALE] if p[at.TORQUE_SCALE] > 0.0 else p[at.FORCE_SCALE]
-    out[0] = p[at.FORCE_SCALE] * (tc * bx - ts * by) + p[at.BIAS_X] + p[at.DRIFT_X] * time
-    out[1] = p[at.FORCE_SCALE] * (ts * bx + tc * by) + p[at.BIAS_Y] + p[at.DRIFT_Y] * time
-    out[2] = torque_scale * force[2] + p[at.BIAS_TORQUE] + p[at.DRIFT_TORQUE] * time
 
 
 @njit(cache=True, error_model="numpy")
@@ -120,7 +109,8 @@ def push_once(
         force[1] += hand[DAMPING] * (direction[1] * way - state[4] - state[5] * lx)
         force[2] = hand[TURN_STIFFNESS] * (yaw - state[2]) - hand[TURN_DAMPING] * state[5]
         hold_back(force, normal, c, s, hand)
-        feel(p, force, c, s, time, felt)
+        # The hand lets go and takes hold anew: its sensor is read at rest as the push begins.
+        feel(p, force, c, s, time, k * dt, felt)
         # The reference waits where the hand cannot follow, as a robot's would.
         lag = hand[MOST_FORCE] / hand[STIFFNESS]
         if (rx - state[0] - lx) ** 2 + (ry - state[1] - ly) ** 2 < lag * lag:
