@@ -161,6 +161,27 @@ def test_places_moments_and_bias_of_what_was_named_right() -> None:
     assert math.isnan(moment_error("tether", TRUTH, entry))
 
 
+@pytest.mark.parametrize(
+    ("column", "turn", "wrapped"),
+    [
+        ("sensor_turn", math.pi, math.pi),
+        ("caster_heading", -0.9 * math.pi, -0.9 * math.pi),
+        ("tag_theta", 2.0 * math.pi, 0.0),
+        ("wheel2_theta", math.pi, 0.0),
+        ("patch_theta", 0.5 * math.pi, 0.5 * math.pi),
+        ("obstacle_angle", 0.5 * math.pi, 0.0),
+    ],
+)
+def test_an_angle_is_off_by_as_much_as_turns_it_into_what_looks_the_same(
+    column: str, turn: float, wrapped: float
+) -> None:
+    truth = replace(TRUTH, told={column: 0.4})
+    entry = {"parameters": {column: {"mean": 0.4 + turn, "sd": 0.1, "unit": "rad"}}}
+    (relative, in_sds) = parameter_bias(truth, entry)[column]
+    assert abs(in_sds) == pytest.approx(abs(wrapped) / 0.1, abs=1e-9)
+    assert relative * 0.4 == pytest.approx(in_sds * 0.1)
+
+
 def test_gain_strength_and_abstention_against_an_oracle() -> None:
     told = score("one", TRUTH, report(["tether"], []), TRUTH.seal(), 3.0, oracle=Oracle(0.01, 60.0, 3.0))
     assert told.gain == pytest.approx(1.0) and told.times_detectable == pytest.approx(3.0)

@@ -30,6 +30,11 @@ MOMENT_COLUMNS = {"payload_change": "payload_time"}
 """Effects that begin at a moment, and the parameter that says when."""
 CONTACTS = ("unseen_body",)
 """Effects that begin when they are met."""
+PERIODS = {
+    **dict.fromkeys(("wheel_theta", "wheel2_theta", "patch_theta"), math.pi),
+    **dict.fromkeys(("obstacle_angle", "unseen_angle"), 0.5 * math.pi),
+}
+"""What is the same after less than a whole turn [rad]: an axle or a rectangle after half, a square after a quarter."""
 
 
 def place_error(effect: str, truth: Truth, entry: Mapping[str, Any], samples: Samples, outline: Array) -> float:
@@ -125,9 +130,10 @@ def moment_error(effect: str, truth: Truth, entry: Mapping[str, Any]) -> float:
 
 
 def parameter_bias(truth: Truth, entry: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-    """Return by parameter how far off its mean is, over the truth and in standard deviations; angles wrapped.
+    """Return by parameter how far off its mean is, over the truth and in standard deviations.
 
-    Parameters of which the simulator's settings say nothing are left out.
+    Angles are wrapped to what looks alike, see `PERIODS`. Parameters of which the simulator's settings say nothing are
+    left out.
     """
     found: dict[str, tuple[float, float]] = {}
     for name, values in entry["parameters"].items():
@@ -135,7 +141,7 @@ def parameter_bias(truth: Truth, entry: Mapping[str, Any]) -> dict[str, tuple[fl
             continue
         off = float(values["mean"]) - truth.told[name]
         if values["unit"] == "rad":
-            off = math.remainder(off, math.pi)
+            off = math.remainder(off, PERIODS.get(name, 2.0 * math.pi))
         size, sd = abs(truth.told[name]), float(values["sd"])
         found[name] = (off / size if size > 0.0 else math.nan, off / sd if sd > 0.0 else math.nan)
     return found
