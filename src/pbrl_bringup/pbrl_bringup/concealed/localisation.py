@@ -90,10 +90,10 @@ def localise(
         if "floor" in told:
             wanted = np.isin(names, list(told["floor"]))
         elif outlines:
-            wanted = _on_cells(samples, regimes, outlines)
+            wanted = _on_cells(regimes, outlines)
         else:
             wanted = _mostly(regimes["floor"], claimed)
-        region = f1(wanted, _on_cells(samples, regimes, polygons))
+        region = f1(wanted, _on_cells(regimes, polygons))
     scores = [_regime(regimes[axis], told.get(axis), claimed, true) for axis in REGIMES]
     either = int(np.count_nonzero(claimed | true))
     overlap = float(np.count_nonzero(claimed & true) / either) if either else 1.0
@@ -110,7 +110,7 @@ def _mostly(bins: Mapping[str, Mask], chosen: Mask) -> Mask:
     return np.array([chosen[inside].mean() > 0.5 for inside in bins.values()], dtype=bool)
 
 
-def _on_cells(samples: Samples, regimes: Regimes, outlines: Sequence[Array]) -> Mask:
+def _on_cells(regimes: Regimes, outlines: Sequence[Array]) -> Mask:
     """Return which visited cells of the floor have their middle in one of the outlines (k, 2)."""
     from_names = np.array([[float(part) for part in name.split(",")] for name in regimes["floor"]]).reshape(-1, 2)
     middles = (from_names + 0.5) * CELL

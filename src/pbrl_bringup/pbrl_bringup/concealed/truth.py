@@ -31,11 +31,6 @@ class Truth:
     share: dict[str, float]
     told: dict[str, float] = field(default_factory=dict)
 
-    @property
-    def active(self) -> bool:
-        """Tell whether every effect made a difference: one that did not is not there to be found."""
-        return all(self.share[name] > 0.0 for name in self.effects)
-
     def seal(self) -> str:
         """Return the SHA-256 of the truth as canonical JSON."""
         return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()

@@ -36,7 +36,7 @@ TAILS = 5.0
 """Degrees of freedom of the Student t that proposals are drawn from."""
 
 
-def noise_unknowns(pull: Pull) -> tuple[Unknown, ...]:
+def noise_unknowns() -> tuple[Unknown, ...]:
     """Return what is learned of the noise: how strong the texture is [N]."""
     return (Unknown("texture", "N", 0.3, 1.0, positive=True),)
 
@@ -54,7 +54,7 @@ class Hypothesis:
 
     def unknowns(self, pull: Pull) -> tuple[Unknown, ...]:
         """Return places and widths of all laws, then the texture."""
-        return (*(each for law in self.laws for each in law.unknowns(pull)), *noise_unknowns(pull))
+        return (*(each for law in self.laws for each in law.unknowns(pull)), *noise_unknowns())
 
     def strengths(self, pull: Pull) -> tuple[Strength, ...]:
         """Return what is solved for: friction first, then the laws'."""

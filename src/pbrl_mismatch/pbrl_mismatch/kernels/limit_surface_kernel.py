@@ -47,7 +47,7 @@ def slid(
 
     In u = (wx, wy, a wm) at the load's middle the limit surface is a ball, r = F u / |u|, and u = l (l A + F)^-1 b for
     the length l that brings (l A + F)^-1 b to length one: Newton's method on one over that length, as in
-    `step_kernel.cone_impulses`.
+    `holding_kernel.cone_impulses`.
 
     Args:
         a: A, mass over dt and what springs and dampers add to it.

@@ -214,7 +214,7 @@ def pushes_along(
     stride: int,
     out: Array,
 ) -> None:
-    """Write what acts on the body in each row's model along one given path, mass times acceleration.
+    """Write how each row's model accelerates the body along one given path.
 
     Args:
         rows: (P, WIDTH).

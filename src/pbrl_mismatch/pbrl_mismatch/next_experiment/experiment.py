@@ -63,7 +63,6 @@ class NextExperiment:
         speed: [m/s].
         duration: [s].
         expected_bits: expected information about which hypothesis is true; a lower bound [bit].
-        most_bits: an upper bound [bit].
         hypotheses: what it is to tell apart.
     """
 
@@ -73,7 +72,6 @@ class NextExperiment:
     speed: float
     duration: float
     expected_bits: float
-    most_bits: float
     hypotheses: tuple[str, ...]
 
     def to_report(self) -> dict[str, Any]:
@@ -123,8 +121,8 @@ def next_experiment(
     if len(pushes) > LOOKED_INTO:
         glance, _ = expected_bits(rng, track, left, pushes, chosen, glance=True)
         pushes = pushes.take(np.sort(np.argsort(-glance, kind="stable")[:LOOKED_INTO]))
-    low, high = expected_bits(rng, track, left, pushes, chosen)
-    return described(track, left, pushes, low, high, int(np.argmax(low)))
+    low, _ = expected_bits(rng, track, left, pushes, chosen)
+    return described(track, left, pushes, low, int(np.argmax(low)))
 
 
 def random_experiment(
@@ -137,14 +135,12 @@ def random_experiment(
     if len(left) < 2 or len(pushes) == 0:
         return None
     one = pushes.take(np.array([rng.integers(len(pushes))]))
-    low, high = expected_bits(rng, track, left, one, chosen)
-    return described(track, left, one, low, high, 0)
+    low, _ = expected_bits(rng, track, left, one, chosen)
+    return described(track, left, one, low, 0)
 
 
-def described(
-    track: Track, left: Sequence[Weighed], pushes: Candidates, low: Array, high: Array, k: int
-) -> NextExperiment:
-    """Return one of the candidates with its bits."""
+def described(track: Track, left: Sequence[Weighed], pushes: Candidates, low: Array, k: int) -> NextExperiment:
+    """Return one of the candidates with its bits (C,)."""
     return NextExperiment(
         track.object,
         (float(pushes.contact[k, 0]), float(pushes.contact[k, 1])),
@@ -152,7 +148,6 @@ def described(
         float(pushes.speed[k]),
         float(pushes.duration[k]),
         float(low[k]),
-        float(high[k]),
         tuple(" + ".join(each.effects) or "nothing left out" for each in left),
     )
 

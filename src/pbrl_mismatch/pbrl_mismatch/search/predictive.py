@@ -52,7 +52,6 @@ class Verdict:
         explained: D, numbers that a left-out wrench would explain.
         rest: R, numbers that are noise either way.
         noise_scale: root of the mean square of the rest: noise over what was thought.
-        by_window: (W,) mean square of what a wrench would explain in each window.
     """
 
     p_value: float
@@ -60,7 +59,6 @@ class Verdict:
     explained: int
     rest: int
     noise_scale: float
-    by_window: Array
 
 
 def belief_conflict(peak: Peak, row: int) -> float:
@@ -171,10 +169,8 @@ def _whiten(windows: list[_Window], share: float) -> _White:
 
 def _split(white: _White) -> Verdict:
     """Split the whitened residual into what wrenches explain and the rest, both free of the model's own slopes."""
-    own, free, windows = white.own, white.free, len(white.pushes)
-    sizes = [each.shape[1] for each in white.pushes]
-    owners = np.repeat(np.arange(windows), [len(each) for each in white.pushes])
-    basis = np.zeros((len(free), sum(sizes)))
+    own, free = white.own, white.free
+    basis = np.zeros((len(free), sum(each.shape[1] for each in white.pushes)))
     row = column = 0
     for each in white.pushes:
         basis[row : row + len(each), column : column + each.shape[1]] = each
@@ -186,8 +182,7 @@ def _split(white: _White) -> Verdict:
     d = basis.shape[1]
     r = max(len(free) - d - own.shape[1], 1)
     if d == 0:
-        return Verdict(1.0, 0.0, 0, r, float(np.sqrt(np.sum(rest**2) / r)), np.zeros(windows))
+        return Verdict(1.0, 0.0, 0, r, float(np.sqrt(np.sum(rest**2) / r)))
     statistic = float(np.sum(explained**2) / d / max(np.sum(rest**2) / r, 1e-12))
-    squares = np.bincount(owners, explained**2, windows) / np.maximum(np.array(sizes), 1)
     p_value = float(f_distribution.sf(statistic, d, r))
-    return Verdict(p_value, statistic, d, r, float(np.sqrt(np.sum(rest**2) / r)), squares)
+    return Verdict(p_value, statistic, d, r, float(np.sqrt(np.sum(rest**2) / r)))
