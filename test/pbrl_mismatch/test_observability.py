@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from pbrl_bag.types import Recording
 from pbrl_mismatch import EFFECTS, DiagnoseOptions, MismatchError, track_of
@@ -55,6 +55,17 @@ def test_power_starts_at_the_level_grows_and_is_inverted_by_needed() -> None:
     for parameters in (1, 5):
         assert float(power(np.array(needed(parameters, 0.05, 0.95)), parameters, 0.05)) == pytest.approx(0.95, abs=1e-6)
     assert float(power(np.array(math.inf), 2, 0.05)) == pytest.approx(1.0)
+
+
+def test_one_number_is_found_in_95_percent_where_the_two_tails_say() -> None:
+    # Of a number with unit noise the far tail never counts: it stands at the sum of two quantiles.
+    assert needed(1, 0.05, 0.95) == pytest.approx((norm.isf(0.025) + norm.isf(0.05)) ** 2, rel=1e-3)
+
+
+def test_what_is_needed_grows_with_what_is_free_and_with_what_is_asked() -> None:
+    values = [needed(freedom, 0.05, 0.95) for freedom in range(1, 12)]
+    assert np.all(np.diff(values) > 0.0)
+    assert needed(3, 0.05, 0.5) < needed(3, 0.05, 0.95) < needed(3, 0.01, 0.95)
 
 
 def test_an_effect_of_the_smallest_strength_is_noticed_as_often_as_stated(track: Any, ground: Fitted) -> None:

@@ -11,6 +11,7 @@ from pbrl_model.transforms import (
     cross_matrix,
     force_moment_transform,
     planar,
+    plane_rotations,
     rotation_matrices,
     transform_wrench,
     wrench_at_centre,
@@ -36,6 +37,13 @@ def homogeneous(rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
 def test_cross_matrix_is_the_cross_product(rng: np.random.Generator) -> None:
     p, v = rng.normal(size=(2, 5, 3))
     np.testing.assert_allclose((cross_matrix(p) @ v[..., None])[..., 0], np.cross(p, v), atol=1e-14)
+
+
+def test_rotations_in_the_plane_are_those_about_the_vertical(rng: np.random.Generator) -> None:
+    angle = rng.uniform(-7.0, 7.0, (3, 4))
+    np.testing.assert_array_equal(plane_rotations(angle), yaw_matrices(angle)[..., :2, :2])
+    point = np.array([2.0, 0.0])
+    np.testing.assert_allclose(plane_rotations(np.array(0.5 * np.pi)) @ point, [0.0, 2.0], atol=1e-15)
 
 
 def test_transform_is_that_of_forces_at_points(rng: np.random.Generator) -> None:

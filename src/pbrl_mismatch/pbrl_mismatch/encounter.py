@@ -18,14 +18,13 @@ from pbrl_mismatch.data.residual import residual_wrench
 from pbrl_mismatch.data.track import Track, origin_of
 from pbrl_mismatch.diagnose import track_of
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
+from pbrl_model.predict import UNKNOWN_MASS
 
 Array = NDArray[np.float64]
 
 ROLLING = 0.02
 """Friction coefficient of a thing on casters. One that slides on feet has more: then what it meets has to stand out
 from that, or it is not told as met."""
-UNKNOWN_MASS = 15.0
-"""Of a thing whose mass nobody tells [kg]."""
 FREELY = 0.04
 """So far some corner of the body has to have gone before [m]."""
 LEAST, RATIO, SURE = 20.0, 1.8, 4.0

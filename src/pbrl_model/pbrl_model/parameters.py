@@ -49,6 +49,8 @@ UNITS: Mapping[str, str] = MappingProxyType(
     }
 )
 ANGLES = frozenset({"wheel_theta"})
+POSITIVE = frozenset({"mass", "mu_x", "mu_y", "mu_ground", "hinge_radius"})
+"""Columns of a posterior that are above zero."""
 
 WHEEL_COLUMNS = ("wheel_x", "wheel_y", "wheel_theta", "mu_x", "mu_y")
 HINGE_COLUMNS = ("hinge_x", "hinge_y", "hinge_radius")

@@ -100,6 +100,19 @@ def yaw_matrices(yaw: Array) -> Array:
     return np.stack([np.stack(row, -1) for row in ((c, -s, zero), (s, c, zero), (zero, zero, one))], -2)
 
 
+def plane_rotations(angle: Array) -> Array:
+    """Return rotations in the plane.
+
+    Args:
+        angle: (...) [rad].
+
+    Returns:
+        (..., 2, 2).
+    """
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
+
+
 def wrench_at_centre(rotation_w_g: Array, position_g: Array, position_centre: Array, wrench: Array) -> Array:
     """Move gripper wrenches to a body's centre of mass, in world axes (35-37).
 

@@ -2,45 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import chi2, norm
 
 from pbrl_bringup.concealed.oracle import (
     JITTER,
+    LEVEL,
     PLAIN,
+    POWER,
     STARTS,
     THOROUGH,
     Oracle,
-    non_centrality,
     starts_told,
 )
 from pbrl_mismatch.effects.effect import Parameter
 from pbrl_mismatch.kernels.columns import COLUMN
+from pbrl_mismatch.observability.power import needed
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.hypothesis import BENT, Hypothesis
-
-
-def test_one_number_is_found_in_95_percent_where_the_two_tails_say() -> None:
-    # Of a number with unit noise the far tail never counts: it stands at the sum of two quantiles.
-    assert non_centrality(1) == pytest.approx((norm.isf(0.025) + norm.isf(0.05)) ** 2, rel=1e-3)
-
-
-@pytest.mark.parametrize("freedom", [1, 3, 7])
-def test_it_is_the_strength_that_a_test_finds_in_95_of_100(freedom: int) -> None:
-    draws = np.random.default_rng(freedom).standard_normal((60_000, freedom))
-    draws[:, 0] += math.sqrt(non_centrality(freedom))
-    assert np.mean(np.sum(draws**2, axis=1) > chi2.isf(0.05, freedom)) == pytest.approx(0.95, abs=0.005)
-
-
-def test_it_grows_with_what_is_free_and_with_what_is_asked() -> None:
-    values = [non_centrality(freedom) for freedom in range(1, 12)]
-    assert np.all(np.diff(values) > 0.0)
-    assert non_centrality(3, 0.05, 0.5) < non_centrality(3) < non_centrality(3, 0.01)
 
 
 def fitted(parameters: int, misfit: float, beside: float = 0.0) -> Any:
@@ -57,7 +39,7 @@ def fitted(parameters: int, misfit: float, beside: float = 0.0) -> Any:
 @pytest.mark.parametrize("times", [0.5, 1.0, 3.0])
 def test_strength_counts_in_units_of_the_least_that_is_found(times: float) -> None:
     # The expected gain of a law with d numbers more is their non-centrality, the strength's square, and d by chance.
-    gain = times**2 * non_centrality(4) + 4.0
+    gain = times**2 * needed(4, LEVEL, POWER) + 4.0
     found = Oracle(fitted(7, 1000.0 - gain), fitted(3, 1000.0))
     assert found.times_detectable == pytest.approx(times)
     beside = Oracle(fitted(7, 1000.0, 0.5 * gain), fitted(3, 1000.0))
@@ -65,8 +47,8 @@ def test_strength_counts_in_units_of_the_least_that_is_found(times: float) -> No
 
 
 def test_of_several_effects_the_faintest_counts() -> None:
-    told, none = fitted(7, 1000.0 - 16.0 * non_centrality(4) - 4.0), fitted(3, 1000.0)
-    alone = fitted(3, told.peak.misfit[0] + 2.25 * non_centrality(4) + 4.0)
+    told, none = fitted(7, 1000.0 - 16.0 * needed(4, LEVEL, POWER) - 4.0), fitted(3, 1000.0)
+    alone = fitted(3, told.peak.misfit[0] + 2.25 * needed(4, LEVEL, POWER) + 4.0)
     assert Oracle(told, none).times_detectable == pytest.approx(4.0)
     assert Oracle(told, none, (none, alone)).times_detectable == pytest.approx(1.5)
 

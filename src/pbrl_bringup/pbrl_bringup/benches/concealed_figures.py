@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 
-from pbrl_bringup.benches.concealed_rows import STRONG, interval
+from pbrl_bringup.benches.concealed_rows import STRONG, interval, median
 from pbrl_bringup.concealed.draws import DRAWS
 from pbrl_bringup.concealed.scoring import Score
 
@@ -131,7 +131,7 @@ def held_out(scores: Sequence[Score]) -> Figure | None:
         ("told oracle", ORACLE, "^", "oracle"),
         ("noise of a pose", "0.5", "|", "floor"),
     ):
-        middles = [_median([getattr(s, field) for s in hidden if s.effects[0] == name]) for name in effects]
+        middles = [median([getattr(s, field) for s in hidden if s.effects[0] == name]) for name in effects]
         rows = np.arange(len(effects))
         axes.scatter(1000.0 * np.array(middles), rows, color=colour, marker=marker, s=34, label=label, zorder=3)
     axes.set_xscale("log")
@@ -144,8 +144,3 @@ def held_out(scores: Sequence[Score]) -> Figure | None:
     axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
     axes.set_title("Does the repaired model predict what was held out?", fontsize=10)
     return page
-
-
-def _median(values: Sequence[float]) -> float:
-    known = [value for value in values if not math.isnan(value)]
-    return float(np.median(known)) if known else math.nan

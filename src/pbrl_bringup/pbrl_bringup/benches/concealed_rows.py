@@ -90,7 +90,7 @@ def _middle(
     """Return a row of a median, with the count behind it and its interval."""
     count = sum(not math.isnan(value) for value in values)
     told = {"interval": median_interval(values), **against}
-    return judged(f"{what}, median of {count}", _median(values), unit, goal, **told)
+    return judged(f"{what}, median of {count}", median(values), unit, goal, **told)
 
 
 def _alarms(clean: Sequence[Score]) -> list[Row]:
@@ -145,10 +145,10 @@ def _repaired(scores: Sequence[Score]) -> list[Row]:
     ratios = [each.before / each.after for each in right]
     oracles = [each.before / each.oracle for each in right if each.oracle > 0.0]
     gains = [each.gain for each in scores if each.mismatch]
-    others = {name: _median(_rival(right, name, _ratio)) for name in _rivals(scores)}
-    others |= {"oracle": _median(oracles)}
-    others |= {"noise_floor": _median([each.before / each.floor for each in right if each.floor > 0.0])}
-    others |= {"start_and_steady_wrench_fitted": _median([each.retold for each in right])}
+    others = {name: median(_rival(right, name, _ratio)) for name in _rivals(scores)}
+    others |= {"oracle": median(oracles)}
+    others |= {"noise_floor": median([each.before / each.floor for each in right if each.floor > 0.0])}
+    others |= {"start_and_steady_wrench_fitted": median([each.retold for each in right])}
     what = "position error of held-out forecasts before over after, where named right"
     return [
         _middle(at_least, what, ratios, "1", 5.0, **others),
@@ -222,7 +222,8 @@ def _rival(scores: Sequence[Score], name: str, value: Callable[[Score, str], flo
     return [value(each, name) for each in scores if name in each.rivals]
 
 
-def _median(values: Sequence[float]) -> float:
+def median(values: Sequence[float]) -> float:
+    """Return the median of what is a number, NaN where nothing is."""
     known = [value for value in values if not math.isnan(value)]
     return float(np.median(known)) if known else math.nan
 

@@ -10,12 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2
 
 from pbrl_bag.types import Recording
 from pbrl_bringup.concealed.truth import Truth
@@ -24,6 +21,7 @@ from pbrl_mismatch.data.grip import lay_grips
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.diagnose import fit_baselines, track_of
 from pbrl_mismatch.effects.registry import EFFECTS
+from pbrl_mismatch.observability.power import needed
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climbed_on import led
 from pbrl_mismatch.search.fitted import Fitted, Stages, cut_stages, fit_from, judged, scene_of
@@ -42,6 +40,8 @@ JITTER = 0.15, 0.003
 missed by a centimetre where a post may be anywhere in a metre or two."""
 THOROUGH = {"candidates": STARTS, "keep": (STARTS, 4), "iterations": (12, 24)}
 """Settings of a fit that is told: what it does not find, what was drawn is thought not to be seen at all."""
+LEVEL, POWER = 0.05, 0.95
+"""Of false alarms, and the share of recordings in which what can be detected is."""
 HOPELESS = 0.7
 """Times the detectable strength below which a first glance says no; it lacks some starts of a look."""
 
@@ -78,14 +78,7 @@ class Oracle:
     def _times(self, less: Fitted) -> float:
         freedom = max(len(self.fitted.hypothesis.parameters) - len(less.hypothesis.parameters), 1)
         found = 2.0 * (_height(self.fitted) - _height(less)) - freedom
-        return math.sqrt(max(found, 0.0) / non_centrality(freedom))
-
-
-@cache
-def non_centrality(freedom: int, level: float = 0.05, power: float = 0.95) -> float:
-    """Return the non-centrality at which a chi-square test with so many degrees of freedom has a power."""
-    bound = float(chi2.isf(level, freedom))
-    return float(brentq(lambda value: ncx2.sf(bound, freedom, value) - power, 1e-3, 200.0))
+        return math.sqrt(max(found, 0.0) / needed(freedom, LEVEL, POWER))
 
 
 def _height(fitted: Fitted) -> float:

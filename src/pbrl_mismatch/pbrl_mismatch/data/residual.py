@@ -21,6 +21,7 @@ from pbrl_mismatch.kernels.columns import WIDTH
 from pbrl_mismatch.kernels.path_kernel import pushes_along
 from pbrl_mismatch.kernels.smoother_kernel import SIZE, smooth_episode, true_centres
 from pbrl_model.sensing.windows import LEAST_NOISE, WIDENING
+from pbrl_model.transforms import yaw_matrices
 
 Array = NDArray[np.float64]
 
@@ -67,19 +68,13 @@ class ResidualWrench:
     @property
     def body(self) -> Array:
         """Return (T, 3) the wrench in the body's axes."""
-        return np.einsum("tij,tj->ti", self._turns(), self.world)
+        return np.einsum("tij,tj->ti", yaw_matrices(-self.state[:, 2]), self.world)
 
     @property
     def body_covariance(self) -> Array:
         """Return (T, 3, 3) of `body`."""
-        turns = self._turns()
+        turns = yaw_matrices(-self.state[:, 2])
         return turns @ self.covariance @ np.swapaxes(turns, -1, -2)
-
-    def _turns(self) -> Array:
-        c, s = np.cos(self.state[:, 2]), np.sin(self.state[:, 2])
-        zero, one = np.zeros_like(c), np.ones_like(c)
-        rows = (np.stack([c, s, zero], -1), np.stack([-s, c, zero], -1), np.stack([zero, zero, one], -1))
-        return np.stack(rows, 1)
 
     @property
     def significance(self) -> Array:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pbrl_bag.types import Grasp, PoseStream, Recording
 from pbrl_mismatch.errors import MismatchError
 from pbrl_model.sensing.clock import planar_yaw
+from pbrl_model.transforms import plane_rotations
 
 Array = NDArray[np.float64]
 
@@ -100,8 +101,8 @@ def _off_any_pin(pair: Pair) -> Array:
     """Return (n,) how far a body is off the pin in the gripper about which it turns best [m]."""
     count = len(pair.time)
     matrix = np.zeros((2 * count + 2, 4))
-    matrix[: 2 * count, :2] = _turns(pair.body[:, 2]).reshape(-1, 2)
-    matrix[: 2 * count, 2:] = -_turns(pair.gripper[:, 2]).reshape(-1, 2)
+    matrix[: 2 * count, :2] = plane_rotations(pair.body[:, 2]).reshape(-1, 2)
+    matrix[: 2 * count, 2:] = -plane_rotations(pair.gripper[:, 2]).reshape(-1, 2)
     # A weak belief keeps the pin near the gripper where nothing turns and it could be anywhere.
     matrix[2 * count :, 2:] = ALONG / LEVER * np.eye(2)
     apart = np.concatenate([(pair.gripper - pair.body)[:, :2].ravel(), [0.0, 0.0]])
@@ -111,11 +112,11 @@ def _off_any_pin(pair: Pair) -> Array:
 
 def _slide(pair: Pair, contact: Array) -> tuple[float, float]:
     """Return since when and how far [m] the gripper's point is off the contact, single wrong readings left out."""
-    there = pair.body[:, :2] + _turns(pair.body[:, 2]) @ contact[:2]
-    back = np.swapaxes(_turns(pair.gripper[:, 2]), 1, 2)
+    there = pair.body[:, :2] + plane_rotations(pair.body[:, 2]) @ contact[:2]
+    back = np.swapaxes(plane_rotations(pair.gripper[:, 2]), 1, 2)
     own = np.einsum("nij,nj->ni", back, there - pair.gripper[:, :2])
     own = np.median(own[pair.time <= pair.time[0] + BEGIN], axis=0)
-    off = np.linalg.norm(pair.gripper[:, :2] + _turns(pair.gripper[:, 2]) @ own - there, axis=1)
+    off = np.linalg.norm(pair.gripper[:, :2] + plane_rotations(pair.gripper[:, 2]) @ own - there, axis=1)
     lasting = _lasting(off)
     gone = np.flatnonzero(lasting > SLID)
     return float(pair.time[gone[0] if len(gone) else 0]), float(lasting.max())
@@ -124,12 +125,6 @@ def _slide(pair: Pair, contact: Array) -> tuple[float, float]:
 def _lasting(off: Array) -> Array:
     """Return (n - 2,) what three neighbours of (n,) have at least."""
     return np.asarray(np.minimum.reduce([off[:-2], off[1:-1], off[2:]]))
-
-
-def _turns(angle: Array) -> Array:
-    """Return (n, 2, 2) rotations by angles (n,) [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], 1)
 
 
 def _said(recording: Recording, grasp: Grasp, since: float, far: float) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pbrl_mismatch.effects.effect import Parameter
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
 from pbrl_mismatch.search.hypothesis import Hypothesis
-from pbrl_model.parameters import ANGLES
+from pbrl_model.parameters import ANGLES, POSITIVE
 from pbrl_model.posterior import Posterior
 from pbrl_model.symmetry import THETA_PERIOD, circular_mean, wrap
 
@@ -44,7 +44,6 @@ FLOORS = {
     "hinge_radius": 0.02,
 }
 """What is the same model: standard deviations that are added to the posterior's, of logarithms where they are taken."""
-POSITIVE = frozenset({"mass", "mu_x", "mu_y", "mu_ground", "hinge_radius"})
 WIDEST = 1.0
 """A standard deviation of a logarithm beyond this says no more than that nothing is known."""
 INERTIA, DELAY = 0.1, 0.005

@@ -33,6 +33,7 @@ from pbrl_mismatch.search.fitted import Fitted
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Reduced
 from pbrl_mismatch.search.one_sided import one_sided
+from pbrl_model.transforms import plane_rotations
 
 Array = NDArray[np.float64]
 
@@ -209,24 +210,18 @@ def _laws(grips: GripTrack) -> tuple[Array, Array, Array]:
     laws = np.stack([grips.force, grips.force / (size + SOFT_FORCE), grips.velocity], -1)
     belongs = (grips.grasp[:, None] == np.arange(grips.grasp.max() + 1)).astype(float)
     still = np.einsum("ng,ij->nigj", belongs, np.eye(2)).reshape(len(belongs), 2, -1)
-    turned = np.einsum("ng,nij->nigj", belongs, _rotations(grips.turn)).reshape(len(belongs), 2, -1)
-    places = np.concatenate([still, turned, _rotations(-grips.heading)], -1)
+    turned = np.einsum("ng,nij->nigj", belongs, plane_rotations(grips.turn)).reshape(len(belongs), 2, -1)
+    places = np.concatenate([still, turned, plane_rotations(-grips.heading)], -1)
     return laws.reshape(-1, 3), places.reshape(len(laws) * 2, -1), grips.place.reshape(-1)
 
 
 def _tag_law(grips: GripTrack) -> Array:
     """Return the design (2 N, 3) of a tag's offset: the seen contact's way off, turned as the gripper is less now."""
     first = np.searchsorted(grips.grasp, grips.grasp)
-    swing = _rotations(grips.turn - grips.turn[first]) - np.eye(2)
+    swing = plane_rotations(grips.turn - grips.turn[first]) - np.eye(2)
     lever = np.stack([-grips.contact[:, 1], grips.contact[:, 0]], -1)[..., None]
     off = np.concatenate([np.broadcast_to(np.eye(2), (len(lever), 2, 2)), lever], -1)
     return np.asarray((swing @ off).reshape(-1, 3), dtype=np.float64)
-
-
-def _rotations(angle: Array) -> Array:
-    """Return (n, 2, 2) of angles (n,) [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
 
 
 def _place_spread(columns: int) -> Array:

@@ -21,15 +21,13 @@ from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_model.arviz_bridge import load_posterior
 from pbrl_model.errors import ModelError
 from pbrl_model.model_file import LearnedParameter, SavedModel
-from pbrl_model.parameters import KERNEL_COLUMNS
+from pbrl_model.parameters import KERNEL_COLUMNS, POSITIVE
 from pbrl_model.posterior import Posterior
 
 Array = NDArray[np.float64]
 
 MODEL_FILES = (".json", ".nc")
 """Endings of files that hold a model: what `diagnose` writes, and what `fit` writes."""
-POSITIVE = frozenset({"mass", "mu_x", "mu_y", "mu_ground", "hinge_radius"})
-"""Columns of a posterior that are above zero."""
 LEAST_SPREAD = 1e-4
 """A posterior is not taken to be narrower: the climb takes steps of a share of it."""
 ANY_TURN = 1.5

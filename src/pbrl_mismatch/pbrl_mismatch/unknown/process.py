@@ -19,6 +19,7 @@ from scipy.optimize import minimize
 
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.unknown.samples import Samples
+from pbrl_model.transforms import yaw_matrices
 
 Array = NDArray[np.float64]
 Axes = Literal["world", "body"]
@@ -80,7 +81,7 @@ class WrenchProcess:
             covariance[:, k, k] = np.maximum(self.size[k] ** 2 - np.sum(known**2, axis=0), 0.0)
         if self.axes == "world":
             return mean, covariance
-        turn = _turns(heading)
+        turn = yaw_matrices(heading)
         return np.einsum("nij,nj->ni", turn, mean), turn @ covariance @ np.swapaxes(turn, -1, -2)
 
     def to_report(self) -> dict[str, Any]:
@@ -119,13 +120,6 @@ def wrench_process(samples: Samples) -> WrenchProcess:
     return max(fits, key=lambda fit: fit.log_likelihood)
 
 
-def _turns(heading: Array) -> Array:
-    """Return (n, 3, 3) from the body's axes to the world's."""
-    c, s = np.cos(heading), np.sin(heading)
-    zero, one = np.zeros_like(c), np.ones_like(c)
-    return np.stack([np.stack([c, -s, zero], -1), np.stack([s, c, zero], -1), np.stack([zero, zero, one], -1)], 1)
-
-
 def _alike(left: Array, right: Array, lengths: Array) -> Array:
     scale = np.repeat(lengths, 2)
     a, b = left / scale, right / scale
@@ -137,7 +131,7 @@ def _fitted(samples: Samples, axes: Axes) -> WrenchProcess:
     inputs = inputs_of(samples.place, samples.heading, samples.velocity)
     wrench, covariance = samples.wrench, samples.covariance
     if axes == "body":
-        back = np.swapaxes(_turns(samples.heading), -1, -2)
+        back = np.swapaxes(yaw_matrices(samples.heading), -1, -2)
         wrench = np.einsum("nij,nj->ni", back, wrench)
         covariance = back @ covariance @ np.swapaxes(back, -1, -2)
     known = np.diagonal(covariance, axis1=1, axis2=2)

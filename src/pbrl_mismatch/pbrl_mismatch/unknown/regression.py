@@ -22,6 +22,7 @@ from pbrl_mismatch.data.residual import ResidualWrench, residual_wrench
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.unknown.features import Feature
 from pbrl_mismatch.unknown.samples import Samples, samples_of
+from pbrl_model.transforms import yaw_matrices
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -116,7 +117,7 @@ def sparse_law(
         features: at those moments.
         floor: size of the wrist sensor's own error [N].
     """
-    design = np.concatenate([*(feature.values for feature in features), _own_error(samples)], axis=-1)
+    design = np.concatenate([*(feature.values for feature in features), yaw_matrices(samples.heading)], axis=-1)
     ends = np.cumsum([len(feature.parts) for feature in features])
     columns = [np.arange(end - len(feature.parts), end) for feature, end in zip(features, ends, strict=True)]
     size = float(np.sqrt(np.mean((samples.wrench / samples.scale) ** 2)))
@@ -141,13 +142,6 @@ def sparse_law(
 def _with_own(columns: Sequence[Index], prior: Array) -> Index:
     """Return columns of features and of the sensor's own error."""
     return np.concatenate([*columns, np.arange(len(prior) - OWN, len(prior))]).astype(np.int64)
-
-
-def _own_error(samples: Samples) -> Array:
-    """Return (N, 3, 3) a wrench that is constant in the body."""
-    c, s = np.cos(samples.heading), np.sin(samples.heading)
-    zero, one = np.zeros_like(c), np.ones_like(c)
-    return np.stack([np.stack([c, -s, zero], -1), np.stack([s, c, zero], -1), np.stack([zero, zero, one], -1)], 1)
 
 
 def _selected(systems: Sequence[_Normal], columns: Sequence[Index], blocks: Index) -> tuple[list[int], float, _Normal]:
@@ -238,7 +232,7 @@ def refined(
         for k in range(len(term.mean))
     ]
     moments = samples_of(track, residual).take(rows)
-    design = np.concatenate([np.stack(seen, -1), _own_error(moments)], axis=-1)
+    design = np.concatenate([np.stack(seen, -1), yaw_matrices(moments.heading)], axis=-1)
     noise = moments.covariance + law.left_over**2 * np.diag(moments.scale**2)
     root = np.linalg.inv(np.linalg.cholesky(noise))
     flat, target = root @ design, np.einsum("nij,nj->ni", root, moments.wrench)

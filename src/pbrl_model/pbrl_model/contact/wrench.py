@@ -18,6 +18,7 @@ from pbrl_model.kernel import GRAVITY
 from pbrl_model.parameters import BodyParameters
 from pbrl_model.rollout import com_to_origin
 from pbrl_model.sensing.motion import Motion
+from pbrl_model.transforms import plane_rotations
 
 Array = NDArray[np.float64]
 
@@ -100,6 +101,4 @@ def frame_path(motion: Motion, body: MassProperties) -> Array:
 
 
 def _placed(points: Array, pose: Array) -> Array:
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    turn = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
-    return points @ np.swapaxes(turn, -1, -2) + pose[:, None, :2]
+    return points @ np.swapaxes(plane_rotations(pose[:, 2]), -1, -2) + pose[:, None, :2]

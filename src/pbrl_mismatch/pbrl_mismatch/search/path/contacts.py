@@ -41,9 +41,9 @@ def contact_points(track: Track, residual: ResidualWrench, *, met: bool = False)
         begins = np.flatnonzero(touched & (before[:-1] - before[since] == 0))
         rows = np.concatenate([rows, np.resize(begins, len(rows))])
     places, normals = [], []
-    com = track.body[1:3]
+    com, body = track.body[1:3], residual.body
     for t in rows:
-        fx, fy, tau = _in_body(residual, int(t))
+        fx, fy, tau = body[t]
         inward = np.array([fx, fy]) / np.hypot(fx, fy)
         found = _entry(track.outline - com, inward, tau / np.hypot(fx, fy))
         if found is None:
@@ -55,12 +55,6 @@ def contact_points(track: Track, residual: ResidualWrench, *, met: bool = False)
     if not places:
         return np.empty((0, 2)), np.empty((0, 2))
     return np.array(places), np.array(normals)
-
-
-def _in_body(residual: ResidualWrench, t: int) -> tuple[float, float, float]:
-    c, s = np.cos(residual.state[t, 2]), np.sin(residual.state[t, 2])
-    fx, fy, tau = residual.world[t]
-    return float(c * fx + s * fy), float(-s * fx + c * fy), float(tau)
 
 
 def _entry(outline: Array, inward: Array, offset: float) -> Array | None:

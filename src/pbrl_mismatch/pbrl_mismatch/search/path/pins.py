@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrl_mismatch.data.track import Track
+from pbrl_model.transforms import plane_rotations
 
 Array = NDArray[np.float64]
 
@@ -31,8 +32,7 @@ def fixed_place(track: Track) -> tuple[Array, float]:
         h [m], and the root mean square of its distance from that point [m].
     """
     x, y, turn = track.seen[:, :3].T
-    c, s = np.cos(turn - turn[0]), np.sin(turn - turn[0])
-    turned = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], 1)
+    turned = plane_rotations(turn - turn[0])
     place = np.stack([x, y], -1)
     matrix, target = turned - np.eye(2), turned @ place[0] - place
     found, *_ = np.linalg.lstsq(matrix.reshape(-1, 2), target.reshape(-1), rcond=None)
