@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bullet_sim.concealed.detent import catch_force
+from bullet_sim.concealed.sloshing_load import SloshingLoadSettings
 from pbrl_bringup.concealed.cases import grip_turn
 from pbrl_bringup.concealed.draws import DRAWS
 from pbrl_bringup.concealed.recording import to_recording
@@ -154,6 +156,25 @@ def test_places_on_the_body_are_where_the_body_stood(stage: Stage) -> None:
     away = np.array([told["pivot_x"] - x, told["pivot_y"] - y])
     c, s = math.cos(theta), math.sin(theta)
     np.testing.assert_allclose([c * away[0] + s * away[1], c * away[1] - s * away[0]], [0.2, -0.3])
+
+
+def test_a_load_s_damping_and_a_catch_s_width_are_the_simulator_s(stage: Stage) -> None:
+    load = {"mass": 5.0, "length": 0.3, "place": [0.1, 0.0]}
+    for more, damping in (({}, SloshingLoadSettings(**load).damping_ratio), ({"damping_ratio": 0.2}, 0.2)):
+        told = told_values({"sloshing_load": {NAME: {**load, **more}}}, stage.with_concealed({}))
+        assert told["slosh_damping"] == damping
+    catch = {"place": [1.0, 0.5], "point": [0.1, 0.2], "gap": 0.04, "force": 12.0}
+    width = told_values({"detent": {NAME: catch}}, stage.with_concealed({}))["detent_width"]
+    away = np.linspace(0.0, 0.08, 80_001)
+    pull = [catch_force(distance, 0.04) for distance in away.tolist()]
+    assert width == pytest.approx(away[np.argmax(pull)], abs=2e-6)
+
+
+def test_a_post_is_told_as_large_as_it_is_drawn(stage: Stage) -> None:
+    drawn = DRAWS["hidden_obstacle"](np.random.default_rng(2), stage, 0.5)
+    corners = np.array(drawn["hidden_obstacle"][0]["polygon"])
+    told = told_values(drawn, stage.with_concealed(drawn))
+    assert told["obstacle_radius"] == pytest.approx(0.5 * np.hypot(*(corners[1] - corners[0])))
 
 
 @pytest.mark.parametrize("quarters", range(-2, 3))

@@ -27,6 +27,8 @@ NEAR_AXLE = 0.01
 """Of a pin from a wheel's axle, as a standard deviation [m]."""
 CRATE = 0.15
 """Half the side of an unseen crate [m]."""
+POST = 0.05
+"""Half the side of a hidden post [m]."""
 FREE = 0.02
 """Between a hidden body and the table as it stands at the start [m]."""
 
@@ -154,7 +156,7 @@ def floor_slope(rng: np.random.Generator, stage: Stage, strength: float) -> dict
 
 def hidden_obstacle(rng: np.random.Generator, stage: Stage, strength: float) -> dict[str, object]:
     """Draw a post into which the table runs; the stronger, the deeper its way would lead into it."""
-    polygon = _in_the_way(rng, stage, 0.05, between(0.01, 0.08, strength))
+    polygon = _in_the_way(rng, stage, POST, between(0.01, 0.08, strength))
     return {"hidden_obstacle": [{"polygon": polygon}]}
 
 

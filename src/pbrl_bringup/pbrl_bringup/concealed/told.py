@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from bullet_sim.concealed.detent import peak_distance
 from bullet_sim.concealed.floor_patch import FloorPatchSettings
+from bullet_sim.concealed.sloshing_load import SloshingLoadSettings
 from bullet_sim.concealed.truth import wheel_truth
 from bullet_sim.scene import Scene
-from pbrl_bringup.concealed.draws import CRATE
+from pbrl_bringup.concealed.draws import CRATE, POST
 from pbrl_bringup.concealed.stage import NAME
 
 GRAVITY = 9.81
@@ -125,7 +127,7 @@ def _slosh(told: Any, scene: Scene, mass: float) -> dict[str, float]:
     return {
         "slosh_mass": told["mass"],
         "slosh_frequency": math.sqrt(GRAVITY / told["length"]) / (2.0 * math.pi),
-        "slosh_damping": 0.05,
+        "slosh_damping": told.get("damping_ratio", SloshingLoadSettings.model_fields["damping_ratio"].default),
         "slosh_x": told["place"][0],
         "slosh_y": told["place"][1],
     }
@@ -149,7 +151,7 @@ def _detent(told: Any, scene: Scene, mass: float) -> dict[str, float]:
         "detent_y": told["place"][1],
         "detent_at_x": told["point"][0],
         "detent_at_y": told["point"][1],
-        "detent_width": 0.39 * told["gap"],
+        "detent_width": peak_distance(told["gap"]),
     }
 
 
@@ -174,7 +176,7 @@ def _obstacle(told: Any, scene: Scene, mass: float) -> dict[str, float]:
     return {
         "obstacle_x": float(middle[0]),
         "obstacle_y": float(middle[1]),
-        "obstacle_radius": 0.05,
+        "obstacle_radius": POST,
         "obstacle_angle": turn,
     }
 
