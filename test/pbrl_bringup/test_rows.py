@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bullet_sim.catalogue import CasterSettings
-from pbrl_bringup.benches.rows import Measured, at_least, at_most, last_line, report, within
+from pbrl_bringup.benches.rows import Measured, at_least, at_most, last_line, report, within, without_goal
 from pbrl_bringup.benches.sim import kinematics_errors, rolling_acceleration
 from pbrl_bringup.commands.bench import BENCHES
 from pbrl_bringup.commands.experiment import EXPERIMENTS
@@ -42,6 +42,12 @@ def test_nan_is_null_and_does_not_hold(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("value", "holds"), [(0.316, False), (0.314, True), (math.nan, False)])
 def test_within_is_a_band(value: float, holds: bool) -> None:
     assert within("radius", value, "m", 0.300, 0.015).holds is holds
+
+
+def test_what_has_nothing_to_reach_holds_where_it_was_measured() -> None:
+    row = without_goal("bias", 0.3, "1", interval="0.1 to 0.4")
+    assert (row.goal, row.holds, row.against) == ("none", True, {"interval": "0.1 to 0.4"})
+    assert not without_goal("bias", math.nan, "1").holds
 
 
 def test_every_bench_has_a_module() -> None:

@@ -246,7 +246,13 @@ def test_rows_say_what_was_measured() -> None:
         rows[f"{over}, mean of 2"].value == pytest.approx(0.4) and rows[f"{over}, mean of 2"].against["best"] == "LISDD"
     )
     spent = rows["CPU time of a diagnosis, without its start and its page, median of 5"]
-    assert spent.against["failed"] == 1 and spent.value == 3.0
+    assert spent.against["failed"] == 1 and spent.value == 3.0 and spent.against["LISDD"] == 1.0
+    bias = rows["strength of what is named right, off over the true one, median of 1"]
+    assert bias.value == pytest.approx(0.1) and bias.goal == "none" and bias.holds
+    assert bias.against["all_parameters"] == pytest.approx(0.03)
+    # Of a place by 1.5 and 2 standard deviations, of the stiffness by half of one.
+    assert bias.against["standard_deviations"] == pytest.approx(1.5)
+    assert bias.against["share_within_two"] == pytest.approx(2 / 3) and bias.against["interval"] == "-inf to inf"
 
 
 @pytest.mark.parametrize("count", [6, 9, 40])

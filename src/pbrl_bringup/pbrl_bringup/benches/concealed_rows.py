@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import beta, binom, kstest
 
-from pbrl_bringup.benches.rows import Row, at_least, at_most
+from pbrl_bringup.benches.rows import Row, at_least, at_most, without_goal
 from pbrl_bringup.concealed.scoring import ALWAYS, Score
+from pbrl_mismatch.observability.strengths import STRENGTHS
 
 STRONG = 3.0
 """Times the strength that a told oracle detects in 95 %."""
@@ -46,13 +47,12 @@ def rows_of(scores: Sequence[Score]) -> list[Row]:
         rows.append(_withheld(by_set["withheld"]))
     hidden = by_set.get("single", [])
     if hidden:
-        rows += [*_repaired(hidden), *_placed(hidden), *_timed(hidden), *_localised(hidden)]
+        rows += [*_repaired(hidden), *_placed(hidden), *_timed(hidden), *_biased(hidden), *_localised(hidden)]
     spent = [each.seconds for each in scores if not math.isnan(each.seconds)]
     failed = sum(bool(each.failed) for each in scores)
-    return [
-        *rows,
-        _middle(at_most, "CPU time of a diagnosis, without its start and its page", spent, "s", 60.0, failed=failed),
-    ]
+    theirs = {name: median(_rival(scores, name, _of("seconds"))) for name in _rivals(scores)}
+    what = "CPU time of a diagnosis, without its start and its page"
+    return [*rows, _middle(at_most, what, spent, "s", 60.0, failed=failed, **theirs)]
 
 
 def interval(hits: int, count: int, level: float = 0.95) -> str:
@@ -177,6 +177,28 @@ def _timed(scores: Sequence[Score]) -> list[Row]:
         found = [each.moments[effect] for each in scores if effect in each.moments]
         rows.append(_middle(at_most, f"time of {what}, off", found, "s", 0.1))
     return rows
+
+
+def _biased(scores: Sequence[Score]) -> list[Row]:
+    """Return how far off parameters are of what is named right, over their true values; a recording counts once.
+
+    What makes an effect strong has a zero that means something. That of places and angles is where an axis happens to
+    begin: how far they are off over that is told beside it, as are standard deviations, which need no zero.
+    """
+    strengths = {column for columns in STRENGTHS.values() for column in columns}
+    known = [{name.rpartition(".")[2]: off for name, off in each.bias.items()} for each in scores]
+    strong = [median([abs(off[0]) for name, off in each.items() if name in strengths]) for each in known]
+    every = [median([abs(off[0]) for off in each.values()]) for each in known]
+    sds = [abs(off[1]) for each in known for off in each.values() if not math.isnan(off[1])]
+    count = sum(not math.isnan(value) for value in strong)
+    beside: dict[str, float | str] = {
+        "interval": median_interval(strong),
+        "all_parameters": median(every),
+        "standard_deviations": median(sds),
+        "share_within_two": _mean([value < 2.0 for value in sds]),
+    }
+    what = f"strength of what is named right, off over the true one, median of {count}"
+    return [without_goal(what, median(strong), "1", **beside)]
 
 
 def _localised(scores: Sequence[Score]) -> list[Row]:

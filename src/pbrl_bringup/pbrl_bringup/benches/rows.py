@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
@@ -46,6 +47,11 @@ def at_least(what: str, value: float, unit: str, limit: float, **against: float 
 def within(what: str, value: float, unit: str, centre: float, slack: float, **against: float | str) -> Row:
     """Return a row whose value may not be further than `slack` from `centre`."""
     return Row(what, float(value), unit, f"{centre:g} +- {slack:g}", bool(abs(value - centre) <= slack), dict(against))
+
+
+def without_goal(what: str, value: float, unit: str, **against: float | str) -> Row:
+    """Return a row that has nothing to reach; NaN, which was not measured, does not hold."""
+    return Row(what, float(value), unit, "none", not math.isnan(value), dict(against))
 
 
 @dataclass(frozen=True)
