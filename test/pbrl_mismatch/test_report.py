@@ -57,13 +57,13 @@ def test_every_place_s_middle_is_where_its_outline_is() -> None:
 @pytest.mark.parametrize("effect", [each for each in EFFECTS.values() if each.where], ids=lambda each: each.name)
 def test_a_place_is_told_in_the_world_or_in_its_object_s_frame(effect: Effect, monkeypatch: pytest.MonkeyPatch) -> None:
     zero, one = np.zeros(2), np.ones(2)
-    scene = Scene(zero, one, zero, 0.5 * one, mass=20.0, force=10.0, speed=0.1, start=0.0, seconds=20.0)
+    scene = Scene(zero, one, zero, zero, 0.5 * one, mass=20.0, force=10.0, speed=0.1, start=0.0, seconds=20.0)
     means = {each.column: {"mean": 0.1} for each in effect.parameters(scene)}
     monkeypatch.setattr(report, "parameters_of", lambda *_: means)
-    monkeypatch.setattr(report, "activity", lambda *_: {effect.name: None})
+    monkeypatch.setattr(report, "activity", lambda *_, **__: {effect.name: None})
     objective = SimpleNamespace(cuts=SimpleNamespace(track=SimpleNamespace(object="table")))
     peak = SimpleNamespace(settled=[True], objective=objective)
-    hypothesis = SimpleNamespace(columns=())
+    hypothesis = SimpleNamespace(columns=(), told=(), effects=(effect.name,))
     fits: Any = SimpleNamespace(usual_scale=1.0, unexplained=0.0, peak=peak, hypothesis=hypothesis, row=None)
     (told,) = findings_of(fits, (Weighed((effect.name,), fits, 0.0, 1.0, False),), scene, exact=False).effects
     moves = effect.name in ("second_wheel", "com_offset", "payload_change")
