@@ -67,8 +67,9 @@ def test_the_report_has_the_contract_s_form(found: Diagnosis) -> None:
     table = report["objects"]["table"]
     assert set(table) == {
         "mismatch", "p_value", "effects", "alternatives", "unexplained_fraction", "unknown", "heldout", "not_shown",
-        "unknown_description", "localisation",
+        "unknown_description", "localisation", "notes",
     }  # fmt: skip
+    assert table["notes"] == list(found.objects["table"].notes)
     assert table["unknown_description"] is None
     assert table["localisation"]["sentences"] and len(table["localisation"]["holds"]) == 1
     for entry in table["not_shown"]:

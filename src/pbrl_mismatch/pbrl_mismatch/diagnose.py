@@ -122,7 +122,7 @@ class Diagnosis:
         pushes = [found.next_push for found in self.objects.values() if found.next_push is not None]
         return {
             "recording": str(self.recording),
-            "objects": {name: dict(found.report) for name, found in self.objects.items()},
+            "objects": {name: {**found.report, "notes": list(found.notes)} for name, found in self.objects.items()},
             "next_experiment": max(pushes, key=lambda each: each.expected_bits).to_report() if pushes else None,
             "seconds": self.seconds,
             **refused,

@@ -77,7 +77,7 @@ class DoorsDiagnosis:
         """Return `report.json` of the command `diagnose`."""
         return {
             "recording": str(self.recording),
-            "objects": {name: dict(found.report) for name, found in self.objects.items()},
+            "objects": {name: {**found.report, "notes": list(found.notes)} for name, found in self.objects.items()},
             "next_experiment": None,
             "seconds": self.seconds,
         }
