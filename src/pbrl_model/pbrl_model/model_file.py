@@ -190,6 +190,17 @@ def _first(error: ValidationError) -> str:
     return f"{place}{': ' if place else ''}{told}{got}"
 
 
+def unsaid(model: SavedModel) -> tuple[str, ...]:
+    """Return the names of the effects that `posterior_of` has no word for: two wheels are one too many."""
+    wheels = "mu_x" in model.parameters
+    return tuple(name for name in model.names if name not in IN_OUR_TERMS or (name == "second_wheel" and wheels))
+
+
+def without(model: SavedModel, names: Sequence[str]) -> SavedModel:
+    """Return a model without some of its effects; the body's own parameters stay as they were learned beside them."""
+    return model.model_copy(update={"effects": tuple(each for each in model.effects if each.effect not in names)})
+
+
 def posterior_of(model: SavedModel) -> Posterior:
     """Return a saved model as an ordinary posterior, with what that leaves out in its notes.
 

@@ -28,7 +28,12 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from pbrl_bag.types import Recording
+from pbrl_model.arviz_bridge import save_posterior
 from pbrl_model.errors import ModelError
+from pbrl_model.fitting.fit import FitOptions
+from pbrl_model.model_file import LearnedEffect, SavedModel, Shape, learned, save_model
+from pbrl_model.online.memory import Learned
+from pbrl_model.online.state import Stored, save
 from pbrl_model.parameters import free_columns
 from pbrl_model.posterior import Posterior
 from pbrl_model.ros import model_node
@@ -42,8 +47,9 @@ RECORDING = Recording(Path("heard"), {}, {}, {}, {}, ())
 class Graph:
     """The node in a thread, and a client beside it."""
 
-    def __init__(self, context: Context):
+    def __init__(self, context: Context, **texts: list[str] | str):
         override = [Parameter("max_draws", Parameter.Type.INTEGER, 50)]
+        override += [Parameter(name, value=value) for name, value in texts.items()]
         self.node = model_node.ModelNode(context, parameter_overrides=override)
         self.client = Node("client", context=context)
         self._spinner = SingleThreadedExecutor(context=context)
@@ -85,14 +91,28 @@ class Graph:
 
 
 @pytest.fixture
-def graph(monkeypatch: pytest.MonkeyPatch, domain: int) -> Iterator[Graph]:
+def made(monkeypatch: pytest.MonkeyPatch, domain: int) -> Iterator[Callable[..., Graph]]:
+    """Makes graphs, one after the other, of a node with parameters."""
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     context = Context()
     rclpy.init(context=context, domain_id=domain)
-    graph = Graph(context)
-    yield graph
-    graph.close()
+    graphs: list[Graph] = []
+
+    def make(**texts: list[str] | str) -> Graph:
+        for each in graphs:
+            each.close()
+        graphs[:] = [Graph(context, **texts)]
+        return graphs[0]
+
+    yield make
+    for each in graphs:
+        each.close()
     rclpy.try_shutdown(context=context)
+
+
+@pytest.fixture
+def graph(made: Callable[..., Graph]) -> Graph:
+    return made()
 
 
 def posterior(name: str) -> Posterior:
@@ -127,6 +147,56 @@ def test_learned_models_are_answered_and_latched(graph: Graph, monkeypatch: pyte
     assert set(models) == {"desk", "table"}
     assert all(model.draws.shape == (1, 50, 6) for model in models.values())
     assert heard[-1].header.stamp == Time()
+
+
+def heard_by(graph: Graph) -> list[ObjectModels]:
+    """What is latched, and what comes."""
+    heard: list[ObjectModels] = []
+    graph.client.create_subscription(ObjectModels, "/object_models", heard.append, LATCHED)
+    graph.until(lambda: heard)
+    return heard
+
+
+def repaired(folder: Path, name: str) -> str:
+    """File of a model with a cord, which no model of ours has."""
+    square = ((-0.4, -0.4), (0.4, -0.4), (0.4, 0.4), (-0.4, 0.4))
+    cord = LearnedEffect(effect="tether", parameters={"tether_stiffness": learned("N/m", np.full(80, 60.0), 60.0)})
+    own = {"mass": learned("kg", np.full(80, 21.0), 21.0), "mu_ground": learned("1", np.full(80, 0.03), 0.03)}
+    shape = Shape(footprint=square, feet=square, com=(0.0, 0.0), inertia_per_mass=0.1)
+    path = folder / f"model_{name}.json"
+    save_model(SavedModel(object=name, shape=shape, parameters=own, effects=(cord,), clock=(2.0, 9.5)), path)
+    return str(path)
+
+
+def test_what_files_say_is_latched_until_more_is_learned(
+    made: Callable[..., Graph], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    save_posterior(posterior("desk"), tmp_path / "posterior_desk.nc")
+    graph = made(models=[repaired(tmp_path, "table"), str(tmp_path / "posterior_desk.nc")])
+    heard = heard_by(graph)
+    models = models_from_msg(heard[0])
+    assert set(models) == {"desk", "table"}
+    assert models["table"].names == ("mass", "mu_ground") and "tether" in models["table"].notes[-1]
+    assert np.array_equal(models["table"].flat, np.tile([21.0, 0.03], (50, 1)))
+    assert heard[0].header.stamp == Time(sec=9, nanosec=500_000_000)
+    monkeypatch.setattr(model_node, "fit_recording", fake_fit([]))
+    monkeypatch.setattr(graph.node.listener, "recording", lambda: RECORDING)
+    assert graph.learn(objects=["table"]).success
+    graph.until(lambda: models_from_msg(heard[-1])["table"].model_class == "wheel")
+    newer = models_from_msg(heard[-1])
+    assert not newer["table"].notes, "what has been learned is told without what the file said"
+    assert np.array_equal(newer["desk"].draws, models["desk"].draws)
+
+
+def test_what_the_node_learned_itself_goes_before_a_file(
+    made: Callable[..., Graph], make_recording: Callable[..., Recording], tmp_path: Path
+) -> None:
+    geometry = make_recording(0, seconds=2.0).bodies["table"]
+    (tmp_path / "state").mkdir()
+    save(tmp_path / "state", Stored(Learned(geometry, True), posterior("table"), FitOptions()))
+    graph = made(models=[repaired(tmp_path, "table"), repaired(tmp_path, "desk")], state=str(tmp_path / "state"))
+    models = models_from_msg(heard_by(graph)[-1])
+    assert models["table"].model_class == "wheel" and models["desk"].names == ("mass", "mu_ground")
 
 
 def test_errors_are_the_answers_message_in_one_line(graph: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -183,7 +253,15 @@ def test_a_signal_ends_a_fit(graph: Graph, monkeypatch: pytest.MonkeyPatch, numb
 
 
 @pytest.mark.parametrize(
-    "argument", ["priors:=no/such/priors.yaml", "max_draws:=0", "max_draws:=many", "max_drows:=10"]
+    "argument",
+    [
+        "priors:=no/such/priors.yaml",
+        "models:=[no/such/model_table.json]",
+        "models:=no/list.json",
+        "max_draws:=0",
+        "max_draws:=many",
+        "max_drows:=10",
+    ],
 )
 def test_errors_at_start_are_one_line_and_exit_code_two(argument: str, domain: int) -> None:
     command = [sys.executable, "-m", "pbrl_model.ros.model_node", "--ros-args", "-p", argument]

@@ -38,6 +38,7 @@ from pbrl_model.ros.conversions import models_to_msg
 from pbrl_model.ros.listener import MEMORY, RecordingListener
 from pbrl_model.ros.markers import model_markers
 from pbrl_model.ros.online_worker import OnlineWorker
+from pbrl_model.told_models import ToldModel, told_models
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 MARKER_SECONDS = 0.5
@@ -48,10 +49,11 @@ class ModelNode(Node):
 
     With `online`, posteriors go on from window to window while something is held, and what is known is published at
     least every `period` as long as data come. With `state`, what is known is kept in files and served after a restart.
+    What `models` say is published until something has been learned of the object.
 
     Raises:
         BagError: a wrong parameter.
-        ModelError: the file of priors or a file of the state is not usable.
+        ModelError: the file of priors, of a model or of the state is not usable.
     """
 
     def __init__(self, context: Context | None = None, **options: Any):
@@ -65,13 +67,15 @@ class ModelNode(Node):
         particles = declare(self, "particles", 300, "particles of each object that is learned online", (50, 100_000))
         period = declare(self, "period", 0.5, "time between two publications while data come [s]", (0.05, 1.0))
         state = declare(self, "state", "", "folder that keeps what was learned, one file an object; empty: nothing")
+        text = "files, one an object: posterior_NAME.nc or model_NAME.json; published until more is learned of it"
+        models = declare(self, "models", [], text)
         memory = declare(self, "memory", MEMORY, "most that is kept of messages for /learn [MB]", (1.0, 100_000.0))
         refuse_unknown(self)
         self._priors = load_prior_options(Path(priors)) if priors else PriorOptions()
         fit = FitOptions(model_class=model_class, priors=self._priors)
         self._options = OnlineOptions(fit=fit, particles=particles)
         self._folder = Path(state) if state else None
-        stored = self._stored()
+        told, stored = told_models([Path(each) for each in models]), self._stored()
         self._posteriors: dict[str, Posterior] = {}
         self._lock = threading.Lock()
         self._stamp = 0.0
@@ -84,7 +88,7 @@ class ModelNode(Node):
         self.listener.tell(Diagnostics(self, self._doing, numbers=self._numbers, runs_in=self.listener))
         self.create_service(LearnModel, "learn", self._learn)
         self.create_timer(MARKER_SECONDS, self._draw, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._serve(stored)
+        self._tell(told, stored)
         if online:
             self._worker = self._start_learning(stored, period)
         self.listener.start()
@@ -107,17 +111,25 @@ class ModelNode(Node):
         prepare(self._folder)
         return load_all(self._folder)
 
-    def _serve(self, stored: Mapping[str, Stored]) -> None:
-        """Publish what is on disk."""
-        if not stored:
+    def _tell(self, told: Mapping[str, ToldModel], stored: Mapping[str, Stored]) -> None:
+        """Publish what is known before anything is heard; what this node learned itself goes before what files say."""
+        posteriors = {name: one.posterior for name, one in told.items()}
+        posteriors |= {name: one.posterior for name, one in stored.items()}
+        if not posteriors:
             return
-        last = max((motion.time[-1] for one in stored.values() for motion in one.learned.motions), default=0.0)
-        self._changed({name: one.posterior for name, one in stored.items()}, float(last))
-        self.get_logger().info(f"known already: {', '.join(stored)}")
+        ends = [float(motion.time[-1]) for one in stored.values() for motion in one.learned.motions]
+        self._changed(posteriors, max([one.until for one in told.values()] + ends, default=0.0))
+        log = self.get_logger()
+        log.info(f"known already: {', '.join(posteriors)}")
+        for name, one in told.items():
+            if name in stored:
+                log.warning(f"{name}: known from what was learned (state), so that {one.path} is not used (models)")
+            elif one.left_out:
+                log.warning(f"{one.path}: {one.posterior.notes[-1]}")
         given = self._options.fit
         for name, one in stored.items():
             if one.fit.model_class != given.model_class or one.fit.priors != given.priors:
-                self.get_logger().warning(
+                log.warning(
                     f"{name}: goes on with the model class ({one.fit.model_class}) and the priors that it was learned "
                     "with, not with those given now; to begin anew, move its file away (state)"
                 )
