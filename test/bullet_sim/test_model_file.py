@@ -51,7 +51,17 @@ NUMBERS: dict[str, dict[str, float]] = {
     "external_force": {"periodic_x": 3.0, "periodic_y": 1.0, "periodic_frequency": 0.5, "periodic_phase": 0.3},
     "grasp_compliance": {"grip_compliance": 5e-4, "grip_play": 2e-3},
     "pose_bias": {"tag_x": 0.02, "tag_y": -0.01, "tag_theta": 0.1},
+    "caster_swivel": {
+        "caster_trail": 0.03, "caster_roll": 0.02, "caster_scrub": 0.022, "caster_twist": 0.05, "caster_heading": 1.0,
+    },
+    "wrench_bias": {"bias_x": 2.0, "bias_y": -1.0, "bias_torque": 0.3, "bias_start": 4.0},
+    "wrench_frame": {"force_scale": 1.2, "sensor_turn": 0.3, "torque_scale": -1.0},
+    "time_offset": {"time_offset": -0.2},
 }  # fmt: skip
+
+
+QUARTER = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+"""From the sensor's axes to the body's: its x is the body's y."""
 
 
 def told(values: Mapping[str, float]) -> dict[str, Any]:
@@ -70,7 +80,8 @@ def write(
         "parameters": told({"mass": MASS, "inertia_factor": 1.0, **(body or {})}),
         "fixed": fixed,
         "effects": [{"effect": name, "parameters": told(values), "fixed": {}} for name, values in effects.items()],
-        "clock": [0.0, 20.0],
+        "clock": [1.5, 20.0],
+        "sensor": {"gripper": "left", "turn": QUARTER},
         "notes": [],
     }
     path = folder / "model_table.json"
@@ -86,7 +97,7 @@ def concealed(folder: Path, effect: str) -> Any:
     made = with_model(scene(), write(folder, {effect: NUMBERS[effect]}))
     assert made.concealed.mass["table"] == pytest.approx(MASS)
     setting = getattr(made.concealed, effect)
-    return setting["table"] if isinstance(setting, dict) else setting
+    return next(iter(setting.values())) if isinstance(setting, dict) else setting
 
 
 @pytest.mark.parametrize("effect", sorted(NUMBERS))
@@ -94,13 +105,70 @@ def test_every_effect_that_can_be_made_fits_a_scene(tmp_path: Path, effect: str)
     assert concealed(tmp_path, effect)
 
 
+def test_every_effect_of_a_scene_can_be_made(tmp_path: Path) -> None:
+    assert set(NUMBERS) == set(MAKERS) == set(EFFECTS)
+
+
 def test_what_cannot_be_made_is_refused_in_one_line(tmp_path: Path) -> None:
-    assert set(NUMBERS) == set(MAKERS)
-    for effect in set(EFFECTS) - set(MAKERS):
-        with pytest.raises(SimError) as caught:
-            with_model(scene(), write(tmp_path, {effect: {}}))
-        said = str(caught.value)
-        assert "\n" not in said and "model_table.json" in said and f"write concealed.{effect} into the scene" in said
+    with pytest.raises(SimError, match=r"^[^\n]*model_table.json: my_law: expected an effect[^\n]*does not know$"):
+        with_model(scene(), write(tmp_path, {"my_law": {}}))
+
+
+@pytest.mark.parametrize(
+    ("effect", "spoil", "said"),
+    [
+        ("wrench_bias", {"sensor": None}, "write concealed.wrench_bias into the scene"),
+        ("wrench_frame", {"sensor": {"gripper": "claw", "turn": QUARTER}}, "left or right, got that of 'claw'"),
+        ("wrench_frame", {"sensor": {"gripper": "left", "turn": [[2.0, 0, 0], [0, 1, 0], [0, 0, 1]]}}, "a rotation"),
+        ("time_offset", {"sensor": None}, "which sensor"),
+        ("caster_swivel", {"object": "desk"}, "caster_swivel.desk: expected a plain_table, got a office_table"),
+    ],
+)
+def test_a_fault_of_nobody_s_sensor_and_casters_on_casters_are_refused(
+    tmp_path: Path, effect: str, spoil: Mapping[str, Any], said: str
+) -> None:
+    path = write(tmp_path, {effect: NUMBERS[effect]})
+    path.write_text(json.dumps({**json.loads(path.read_text()), **spoil}))
+    desk = {"kind": "office_table", "size": [0.8, 1.4], "height": 0.7, "nominal_mass": 30.0, "pose": [-1.0, 2.0, 0.0]}
+    with pytest.raises(SimError) as caught:
+        with_model(parse_settings({**SCENE, "bodies": {"table": TABLE, "desk": desk}}, Scene, "test"), path)
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_sensor_shows_the_opposite_of_what_acts_in_its_own_axes(tmp_path: Path) -> None:
+    offset = concealed(tmp_path, "wrench_bias")
+    assert np.allclose(offset.force, [1.0, 2.0, 0.0]) and np.allclose(offset.torque, [0.0, 0.0, -0.3])
+    assert offset.start + 0.5 * offset.rise == pytest.approx(4.0)
+    always = {name: value for name, value in NUMBERS["wrench_bias"].items() if name != "bias_start"}
+    made = with_model(scene(), write(tmp_path, {"wrench_bias": always})).concealed.wrench_bias["left"]
+    assert made.start == 1.5 and made.rise == 0.0, "after the sensor was read at rest"
+    drift = {"wrench_bias": {"drift_x": 0.0, "drift_y": 0.4, "drift_torque": 0.0}}
+    made = with_model(scene(), write(tmp_path, drift)).concealed.wrench_bias["left"]
+    assert np.allclose(made.force_drift, [-0.4, 0.0, 0.0]) and made.start == 0.0
+    frame = concealed(tmp_path, "wrench_frame")
+    assert np.allclose(frame.turn, [0.0, 0.0, -0.3]) and frame.scale == 1.2 and frame.torque_scale is None
+
+
+def test_poses_that_come_late_are_the_tag_s_and_ones_that_come_early_are_a_late_force(tmp_path: Path) -> None:
+    for late, stream in ((0.2, "table"), (-0.2, "left")):
+        made = with_model(scene(), write(tmp_path, {"time_offset": {"time_offset": late}})).concealed
+        assert {name: each.delay for name, each in made.time_offset.items()} == {stream: 0.2}
+    assert not with_model(scene(), write(tmp_path, {"time_offset": {"time_offset": 0.0}})).concealed.time_offset
+
+
+def test_casters_resist_as_was_found(tmp_path: Path) -> None:
+    made, found = concealed(tmp_path, "caster_swivel"), NUMBERS["caster_swivel"]
+    load = MASS * GRAVITY / 4
+    assert made.rolling_resistance / made.radius == pytest.approx(found["caster_roll"])
+    assert made.swivel_friction / made.trail == pytest.approx(found["caster_scrub"] * load)
+    assert made.sliding_friction * made.contact_width / 4 / made.trail == pytest.approx(found["caster_twist"])
+    assert made.scrub_length is None
+    laid = {"caster_swivel": {**found, "caster_lay": 0.02}, "ground_friction": NUMBERS["ground_friction"]}
+    both = with_model(scene(), write(tmp_path, laid)).concealed
+    casters, glides = both.caster_swivel["table"], both.ground_friction["table"]
+    assert casters.scrub_length == 0.02
+    assert casters.rolling_resistance / casters.radius * (1 - glides.load_share) == pytest.approx(found["caster_roll"])
+    assert glides.friction * glides.load_share == pytest.approx(0.06), "the sum is that of the whole weight"
 
 
 def test_a_wheel_has_the_friction_that_was_found_whichever_way_it_is_described(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -86,6 +87,32 @@ def test_the_axes_are_the_body_s_when_it_was_first_held_and_the_same_in_each_gra
     assert list(cut.begin) == [0, half] and list(cut.last) == [half - 1, len(motion.wrench) - 1]
     # The sensor was read before the grasp, of which both are parts.
     np.testing.assert_allclose(cut.mount[:, 4], whole.mount[:, 4])
+
+
+def test_the_sensor_s_axes_are_those_that_it_had_in_the_body_s_when_it_first_held(recording: Recording) -> None:
+    motion, geometry = motions_of(recording, "table")[0], recording.bodies["table"]
+    hand, s, c = recording.gripper_poses["left"], math.sin(0.35), math.cos(0.35)
+    x, y, z, w = hand.quaternion.T
+    about = np.stack([c * x + s * y, c * y - s * x, c * z + s * w, c * w - s * z], -1)
+    by_a_turn = replace(recording, gripper_poses={"left": replace(hand, quaternion=about)})
+    found = []
+    for each in (recording, by_a_turn):
+        gripper, turn = lay_track(each, [motion], geometry, body_of(geometry, motion.oriented)).sensor or pytest.fail()
+        assert gripper == "left"
+        np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-9)
+        found.append(math.atan2(turn[1, 0], turn[0, 0]))
+    assert found[1] - found[0] == pytest.approx(0.7, abs=1e-6)
+    unseen = replace(recording, gripper_poses={})
+    assert lay_track(unseen, [motion], geometry, body_of(geometry, motion.oriented)).sensor is None
+    other = replace(recording.grasps[0], gripper="right")
+    both = replace(
+        recording,
+        grasps=(*recording.grasps, other),
+        wrenches=dict.fromkeys(("left", "right"), recording.wrenches["left"]),
+        gripper_poses=dict.fromkeys(("left", "right"), hand),
+    )
+    held = replace(motion, grippers=("left", "right"))
+    assert lay_track(both, [held], geometry, body_of(geometry, motion.oriented)).sensor is None
 
 
 def test_a_drift_counts_from_when_the_sensor_was_read_at_rest(recording: Recording) -> None:

@@ -11,12 +11,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import ConfigDict, Field
 
 from bullet_sim.catalogue import Body, Fixture
-from bullet_sim.concealed.from_model import MAKERS, Told, body_itself
+from bullet_sim.concealed.from_model import MAKERS, body_itself
+from bullet_sim.concealed.told import Sensor, Told
 from bullet_sim.errors import SimError, nearest
-from bullet_sim.settings import Settings, parse_settings
+from bullet_sim.settings import Settings, Vector3, parse_settings
 
 
 class _Loose(Settings):
@@ -39,6 +41,13 @@ class LearnedEffect(_Loose):
     fixed: dict[str, float] = Field(default_factory=dict)
 
 
+class LearnedWith(_Loose):
+    """The force sensor that the model was learned with, and its axes in the body's frame."""
+
+    gripper: str
+    turn: tuple[Vector3, Vector3, Vector3]
+
+
 class ModelFile(_Loose):
     """What a simulator needs of a model's file."""
 
@@ -47,6 +56,8 @@ class ModelFile(_Loose):
     parameters: dict[str, LearnedNumber]
     fixed: dict[str, float] = Field(default_factory=dict)
     effects: tuple[LearnedEffect, ...] = ()
+    clock: tuple[float, float] = (0.0, 0.0)
+    sensor: LearnedWith | None = None
 
 
 def read_model(path: Path) -> ModelFile:
@@ -87,10 +98,11 @@ def concealed_of(path: Path, bodies: Mapping[str, Body], name: str | None = None
         if effect.effect not in MAKERS:
             raise SimError(
                 f"{path}: {effect.effect}: expected an effect that a simulator can make from numbers "
-                f"({', '.join(MAKERS)}), got one that it cannot; write concealed.{effect.effect} into the scene"
+                f"({', '.join(MAKERS)}), got one that it does not know"
             )
         values |= {name: each.best for name, each in effect.parameters.items()} | effect.fixed
-    told = Told(target, body, values, tuple(effect.effect for effect in model.effects))
+    sensor = None if model.sensor is None else Sensor(model.sensor.gripper, np.array(model.sensor.turn))
+    told = Told(target, body, values, tuple(effect.effect for effect in model.effects), sensor, model.clock[0])
     try:
         found = body_itself(told)
         for effect in model.effects:

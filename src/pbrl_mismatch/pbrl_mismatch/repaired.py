@@ -22,7 +22,7 @@ from pbrl_mismatch.kernels.motion_kernel import simulate_serial
 from pbrl_mismatch.kernels.places import PIVOT_OFF_X, PIVOT_OFF_Y
 from pbrl_mismatch.search.fitted import Fitted
 from pbrl_model.errors import ModelError
-from pbrl_model.model_file import LearnedEffect, LearnedParameter, SavedModel, Shape, learned, load_model
+from pbrl_model.model_file import LearnedEffect, LearnedParameter, SavedModel, Sensor, Shape, learned, load_model
 from pbrl_model.parameters import nearest
 from pbrl_model.rollout import DT, com_to_origin, plain
 
@@ -76,7 +76,16 @@ def saved_model(
         effects=tuple(effects),
         clock=(float(track.clock[0]), float(track.clock[-1])),
         notes=tuple(notes),
+        sensor=_sensor(track),
     )
+
+
+def _sensor(track: Track) -> Sensor | None:
+    if track.sensor is None:
+        return None
+    gripper, turn = track.sensor
+    x, y, z = ((float(row[0]), float(row[1]), float(row[2])) for row in turn)
+    return Sensor(gripper=gripper, turn=(x, y, z))
 
 
 def _columns(name: str) -> set[str]:

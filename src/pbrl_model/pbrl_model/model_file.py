@@ -21,6 +21,7 @@ from pbrl_model.posterior import Posterior
 
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Axis = tuple[Finite, Finite, Finite]
 
 FORMAT: Final = "pbrl_model/model/1"
 IN_OUR_TERMS = ("second_wheel", "ground_friction")
@@ -85,6 +86,18 @@ class Shape(_Strict):
     nominal_mass: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
 
 
+class Sensor(_Strict):
+    """The force sensor that a model was learned with: its faults are told in the axes that the body had then.
+
+    Attributes:
+        gripper: whose it is.
+        turn: (3, 3) rotation from its axes to the body's when it first held the body.
+    """
+
+    gripper: Annotated[str, Field(min_length=1)]
+    turn: tuple[Axis, Axis, Axis]
+
+
 class SavedModel(_Strict):
     """A model of one object.
 
@@ -97,6 +110,7 @@ class SavedModel(_Strict):
         effects: what was added.
         clock: the recording's first and last moment: times among the parameters are on this clock [s].
         notes: what must not be read into it, in sentences.
+        sensor: None: several, or where it was is not known.
     """
 
     format: Literal["pbrl_model/model/1"] = FORMAT
@@ -107,6 +121,7 @@ class SavedModel(_Strict):
     effects: tuple[LearnedEffect, ...] = ()
     clock: tuple[Finite, Finite] = (0.0, 0.0)
     notes: tuple[str, ...] = ()
+    sensor: Sensor | None = None
 
     @model_validator(mode="after")
     def _fits(self) -> SavedModel:

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
-from bullet_sim.catalogue import Block, Body, Fixture, OnCasters
+from bullet_sim.catalogue import Block, CasterSettings, Fixture
 from bullet_sim.client import GRAVITY
 from bullet_sim.concealed.detent import peak_distance
-from bullet_sim.concealed.foot_friction import OnGlides
+from bullet_sim.concealed.from_sensors import late_stream, sensor_frame, sensor_offset
 from bullet_sim.concealed.hidden_bodies import UnseenBodySettings
+from bullet_sim.concealed.told import LEAST_LOAD, TREAD, Told, frictions
 
-TREAD, LEAST_LOAD, WHEEL_RADIUS = 0.7, 5.0, 0.05
-"""Sliding friction of a wheel's tread; least load that bears on one [N]; its radius [m]."""
+WHEEL_RADIUS = 0.05
+"""Of a wheel on a strut [m]."""
 BALLAST_SHARES = (0.15, 0.3, 0.45, 0.6)
 """Shares of a body's mass that are tried as ballast: the less, the further out it has to stand."""
 LEAST_SLIDING = 1e-3
@@ -28,56 +28,12 @@ CRATE_FRICTION, SLIDES = 0.15, 0.9
 mass is what then needs the force that was found."""
 LEAST_GIVE = 1e-5
 """Of a hold [m/N]: stiffer ones are all alike, and one that a fit takes below zero is stiff."""
+CASTERS, LEAST_BEARING = 4, 0.2
+"""Under a table; share of its weight that they bear at least, beside glides and wheels on struts."""
 CORNERS = 16
 """Of a disc."""
 DISC = -10.0
 """An `unseen_angle` or `obstacle_angle` at or below it means one."""
-
-
-@dataclass(frozen=True)
-class Told:
-    """What a model says of one body.
-
-    Attributes:
-        name: of the body in the scene.
-        body: its settings there.
-        values: numbers by name.
-        effects: names of all effects of the model.
-    """
-
-    name: str
-    body: Body
-    values: Mapping[str, float]
-    effects: tuple[str, ...]
-
-    def __getitem__(self, name: str) -> float:
-        return self.values[name]
-
-    def get(self, name: str, default: float = 0.0) -> float:
-        """Return a number, or what it is when nothing is said."""
-        return self.values.get(name, default)
-
-    def place(self, name: str) -> list[float]:
-        """Return a point from two numbers."""
-        return [self[f"{name}_x"], self[f"{name}_y"]]
-
-    @property
-    def weight(self) -> float:
-        """Weight of the body [N]."""
-        return self["mass"] * GRAVITY
-
-    @property
-    def on_feet(self) -> float:
-        """Share of the weight that slides on feet, 0..1: wheels on struts carry the rest."""
-        if isinstance(self.body, OnCasters):
-            return float(OnGlides.model_fields["load_share"].default)
-        wheels = [self.load(key) for key in ("", "2") if f"wheel{key}_x" in self.values]
-        return max(1.0 - sum(wheels) / self.weight, 0.2)
-
-    def load(self, key: str) -> float:
-        """Return what bears on a wheel [N]: the first, "", or the second, "2"."""
-        along, across = _frictions(self, key)
-        return max(LEAST_LOAD, max(along, across) * self.weight / TREAD)
 
 
 Maker = Callable[[Told], dict[str, Any]]
@@ -99,16 +55,9 @@ def body_itself(told: Told) -> dict[str, Any]:
     return found
 
 
-def _frictions(told: Told, key: str) -> tuple[float, float]:
-    """Return friction of a wheel along and across its heading; below zero across means the same as along."""
-    along = told[f"wheel{key}_mu_x" if key else "mu_x"]
-    across = told.get(f"wheel{key}_mu_y" if key else "mu_y", -1.0)
-    return along, along if across < 0.0 else across
-
-
 def _wheel(told: Told, key: str) -> dict[str, Any]:
     """Return a wheel on a strut: the direction of less friction is the one in which it rolls."""
-    along, across = _frictions(told, key)
+    along, across = frictions(told, key)
     heading = told.get(f"wheel{key}_theta")
     locked = along == across
     if along > across:
@@ -127,6 +76,28 @@ def _wheel(told: Told, key: str) -> dict[str, Any]:
 
 def _second_wheel(told: Told) -> dict[str, Any]:
     return {"second_wheel": {told.name: _wheel(told, "2")}}
+
+
+def _caster_swivel(told: Told) -> dict[str, Any]:
+    """Return casters in the place of a table's feet; how they are turned at the start is left to chance, as of all.
+
+    A wheel's radius is in nothing that was learned: it is a caster's usual one, with the lever that resists as much.
+    """
+    usual = CasterSettings()
+    rubs = bool({"ground_friction", "breakaway_friction"} & set(told.effects)) or told.get("mu_ground") > 0.0
+    wheels = [told.load(key) for key in ("", "2") if f"wheel{key}_x" in told.values]
+    bears = max(1.0 - sum(wheels) / told.weight - (told.on_feet if rubs else 0.0), LEAST_BEARING)
+    trail = told["caster_trail"]
+    make = {
+        "trail": trail,
+        "radius": usual.radius,
+        "rolling_resistance": told["caster_roll"] * usual.radius / bears,
+        "swivel_friction": told["caster_scrub"] * trail * told.weight / CASTERS,
+        "contact_width": told["caster_twist"] * 4.0 * trail / (usual.sliding_friction * bears),
+    }
+    if "caster_lay" in told.values:
+        make["scrub_length"] = told["caster_lay"]
+    return {"caster_swivel": {told.name: make}}
 
 
 def _ground_friction(told: Told) -> dict[str, Any]:
@@ -298,6 +269,9 @@ MAKERS: Mapping[str, Maker] = {
     "external_force": _external_force,
     "grasp_compliance": _grasp_compliance,
     "pose_bias": _pose_bias,
+    "caster_swivel": _caster_swivel,
+    "wrench_bias": sensor_offset,
+    "wrench_frame": sensor_frame,
+    "time_offset": late_stream,
 }
-"""What can be made from numbers, by the effect's name. Not there: casters, which are a make and not a number, and
-faults of a force sensor, which are a gripper's and not a body's."""
+"""What can be made from numbers, by the effect's name."""

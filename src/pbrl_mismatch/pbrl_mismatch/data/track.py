@@ -19,6 +19,7 @@ from pbrl_mismatch.errors import MismatchError
 from pbrl_model.geometry import MassProperties, bounding_box, check_polygon
 from pbrl_model.sensing.clock import smooth_gripper
 from pbrl_model.sensing.motion import MARGIN, Motion, read_at_rest
+from pbrl_model.transforms import yaw_matrices
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -51,6 +52,8 @@ class Track:
         nominal_mass: [kg], NaN where it was not told.
         missing: stretches that are not to be believed; no window holds any of them.
         unheard: so many more episodes were left out: under way when their force was first recorded.
+        sensor: gripper whose sensor felt all of it, and the rotation (3, 3) from the sensor's axes to the body's when
+            it first held on; None: several grippers, or one that was not seen.
     """
 
     object: str
@@ -68,6 +71,7 @@ class Track:
     nominal_mass: float
     missing: tuple[Missing, ...] = ()
     unheard: int = 0
+    sensor: tuple[str, Array] | None = None
 
     @property
     def dt(self) -> float:
@@ -145,7 +149,18 @@ def lay_track(
         outline=np.ascontiguousarray(check_polygon(geometry.footprint)),
         feet=_feet(geometry),
         nominal_mass=geometry.nominal_mass,
+        sensor=_only_sensor(motions, first),
     )
+
+
+def _only_sensor(motions: Sequence[Motion], first: dict[str, tuple[Array, float]]) -> tuple[str, Array] | None:
+    """Return the gripper that held alone, and its sensor's axes in those of the body when it began to."""
+    grippers = {gripper for motion in motions for gripper in motion.grippers}
+    if len(grippers) != 1 or not grippers <= set(first):
+        return None
+    (gripper,) = grippers
+    rotation, heading = first[gripper]
+    return gripper, yaw_matrices(np.array([-heading]))[0] @ rotation
 
 
 def _feet(geometry: BodyGeometry) -> Array:
