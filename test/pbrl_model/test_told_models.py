@@ -66,6 +66,15 @@ def test_what_was_not_learned_is_in_the_draws_where_it_is_something(tmp_path: Pa
     assert np.array_equal(again, Posterior("door", "hinge", names, draws, base).rows()), "without a base they are alike"
 
 
+def test_half_a_place_is_made_whole_or_refused(tmp_path: Path) -> None:
+    half = {name: column for name, column in WHEEL.items() if name != "wheel_y"}
+    told = told_model(model(tmp_path, parameters=MASS | half)).posterior
+    assert not told.column("wheel_y").any()
+    path = model(tmp_path, parameters=MASS | {"hinge_x": column("m", 0.5)})
+    with pytest.raises(ModelError, match=r"model_table\.json: expected hinge_radius beside mass, hinge_x, got none"):
+        told_model(path)
+
+
 def test_files_are_of_an_object_each(tmp_path: Path) -> None:
     path = model(tmp_path, TETHER)
     other = tmp_path / "posterior_desk.nc"

@@ -11,8 +11,11 @@ import numpy as np
 from pbrl_model.arviz_bridge import load_posterior
 from pbrl_model.errors import ModelError
 from pbrl_model.model_file import SIMULATES_ALL, SavedModel, load_model, posterior_of, unsaid, without
-from pbrl_model.parameters import KERNEL_COLUMNS, BodyParameters
+from pbrl_model.parameters import HINGE_COLUMNS, KERNEL_COLUMNS, BodyParameters
 from pbrl_model.posterior import Posterior
+
+TOGETHER = (("wheel_x", "wheel_y"), HINGE_COLUMNS)
+"""What a place consists of."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ def told_model(path: Path) -> ToldModel:
         ModelError: it is missing or none of a model.
     """
     if path.suffix.lower() != ".json":
-        return ToldModel(path, _whole(load_posterior(path)))
+        return ToldModel(path, _whole(path, load_posterior(path)))
     model = load_model(path)
     left_out = unsaid(model)
     try:
@@ -69,7 +72,7 @@ def told_model(path: Path) -> ToldModel:
         raise ModelError(f"{path}: {error}") from None
     if left_out:
         posterior = replace(posterior, notes=(*posterior.notes, _not_in_it(model, left_out)))
-    return ToldModel(path, _whole(posterior), left_out, model.clock[1])
+    return ToldModel(path, _whole(path, posterior), left_out, model.clock[1])
 
 
 def _not_in_it(model: SavedModel, left_out: Sequence[str]) -> str:
@@ -77,17 +80,21 @@ def _not_in_it(model: SavedModel, left_out: Sequence[str]) -> str:
     return f"without {names} of {model.object}, which {SIMULATES_ALL} simulates: parameters are as beside {beside}"
 
 
-def _whole(posterior: Posterior) -> Posterior:
+def _whole(path: Path, posterior: Posterior) -> Posterior:
     """Return a posterior whose draws hold what was not learned, too, where it is not what it is when nothing is said.
 
-    A message carries draws alone.
+    A message carries draws alone, and half a place is none.
     """
     base, neutral = posterior.base.to_vector(), BodyParameters(mass=1.0).to_vector()
+    needed = {name for group in TOGETHER if set(group) & set(posterior.names) for name in group}
     told = {
         name: float(value)
         for name, value, off in zip(KERNEL_COLUMNS, base, neutral, strict=True)
-        if name not in posterior.names and np.isfinite(value) and value != off
+        if name not in posterior.names and (name in needed or (np.isfinite(value) and value != off))
     }
+    unknown = [name for name, value in told.items() if not np.isfinite(value)]
+    if unknown:
+        raise ModelError(f"{path}: expected {', '.join(unknown)} beside {', '.join(posterior.names)}, got none")
     columns = [np.full((*posterior.draws.shape[:2], 1), value) for value in told.values()]
     return replace(
         posterior, names=(*posterior.names, *told), draws=np.concatenate([posterior.draws, *columns], axis=-1)

@@ -157,14 +157,14 @@ def heard_by(graph: Graph) -> list[ObjectModels]:
     return heard
 
 
-def repaired(folder: Path, name: str) -> str:
+def repaired(folder: Path, name: str, end: float = 9.5) -> str:
     """File of a model with a cord, which no model of ours has."""
     square = ((-0.4, -0.4), (0.4, -0.4), (0.4, 0.4), (-0.4, 0.4))
     cord = LearnedEffect(effect="tether", parameters={"tether_stiffness": learned("N/m", np.full(80, 60.0), 60.0)})
     own = {"mass": learned("kg", np.full(80, 21.0), 21.0), "mu_ground": learned("1", np.full(80, 0.03), 0.03)}
     shape = Shape(footprint=square, feet=square, com=(0.0, 0.0), inertia_per_mass=0.1)
     path = folder / f"model_{name}.json"
-    save_model(SavedModel(object=name, shape=shape, parameters=own, effects=(cord,), clock=(2.0, 9.5)), path)
+    save_model(SavedModel(object=name, shape=shape, parameters=own, effects=(cord,), clock=(2.0, end)), path)
     return str(path)
 
 
@@ -186,6 +186,11 @@ def test_what_files_say_is_latched_until_more_is_learned(
     newer = models_from_msg(heard[-1])
     assert not newer["table"].notes, "what has been learned is told without what the file said"
     assert np.array_equal(newer["desk"].draws, models["desk"].draws)
+
+
+def test_a_file_of_no_time_that_is_is_told_all_the_same(made: Callable[..., Graph], tmp_path: Path) -> None:
+    (heard,) = heard_by(made(models=[repaired(tmp_path, "table", 1e15)]))
+    assert heard.header.stamp.sec == 2**31 - 1
 
 
 def test_what_the_node_learned_itself_goes_before_a_file(

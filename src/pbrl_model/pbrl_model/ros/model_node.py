@@ -42,6 +42,8 @@ from pbrl_model.told_models import ToldModel, told_models
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 MARKER_SECONDS = 0.5
+LAST = float(2**31 - 1)
+"""Latest time that a stamp can say [s]; a file may tell of any."""
 
 
 class ModelNode(Node):
@@ -257,7 +259,8 @@ def _end_of(recording: Recording) -> float:
 
 
 def _stamp(seconds: float) -> Time:
-    whole = int(np.floor(seconds))
+    seconds = min(max(seconds, 0.0), LAST)
+    whole = int(seconds)
     return Time(sec=whole, nanosec=min(int((seconds - whole) * 1e9), 999_999_999))
 
 
