@@ -86,6 +86,10 @@ def diagnose(
         float | None,
         typer.Option(help="How well each side of the outline is known [m]. Default: 0, exactly."),
     ] = None,
+    most_together: Annotated[
+        int | None,
+        typer.Option(min=1, max=3, help="Effects at most that are sought together; each more takes longer. Default: 2."),
+    ] = None,
     seed: Seed = 0,
     workers: Annotated[
         int | None,
@@ -108,7 +112,12 @@ def diagnose(
         baseline=baseline or [],
         without=without or [],
         effects=effects or [],
-        known={"mass_spread": mass_spread, "grasp_spread": grasp_spread, "outline_spread": outline_spread},
+        settings={
+            "mass_spread": mass_spread,
+            "grasp_spread": grasp_spread,
+            "outline_spread": outline_spread,
+            "most_together": most_together,
+        },
         seed=seed,
         workers=workers,
         scheduler=scheduler,

@@ -69,7 +69,7 @@ def command(
     baseline: list[str],
     without: list[str],
     effects: Sequence[Path],
-    known: Mapping[str, float | None],
+    settings: Mapping[str, float | None],
     seed: int,
     workers: int | None,
     scheduler: str | None,
@@ -84,7 +84,7 @@ def command(
         baseline: kinds of body, and models' files.
         without: effects that the library does without.
         effects: Python files that add effects to it.
-        known: how well things are known, by option; None: the default.
+        settings: by option, how well things are known and how many are sought; None: the default.
         seed: of every draw.
         workers: threads of a diagnosis; None: two, or one where there are many recordings.
         scheduler: where many recordings are diagnosed; None: on this machine.
@@ -104,12 +104,12 @@ def command(
     kinds = tuple(each for each in baseline if not is_model_file(each))
     told: dict[str, Any] = {"baseline": kinds} if kinds else {}
     told["models"] = tuple(Path(each) for each in baseline if is_model_file(each))
-    told |= {name: value for name, value in known.items() if value is not None}
+    told |= {name: value for name, value in settings.items() if value is not None}
     threads = (1 if many else THREADS) if workers is None else workers
     options = DiagnoseOptions(without=tuple(without), seed=seed, workers=threads, **told)
     if many:
         mapping, files = None if mapping is None else mapping.absolute(), tuple(each.absolute() for each in effects)
-        typed = {"map": mapping, "baseline": baseline, "without": without, "effects": files, **known, "seed": seed}
+        typed = {"map": mapping, "baseline": baseline, "without": without, "effects": files, **settings, "seed": seed}
         asked = Asked(mapping, tuple(baseline), files, options, typed)
         run_many = import_module("pbrl_bringup.scale.many").run_many  # Dask is slow to load
         return int(run_many(diagnose_one, chosen.bags, asked, out, scheduler or LOCAL, COLUMNS, "diagnosing"))
