@@ -88,7 +88,7 @@ def diagnose(
     ] = None,
     most_together: Annotated[
         int | None,
-        typer.Option(min=1, max=3, help="Effects at most that are sought together; each more takes longer. Default: 2."),
+        typer.Option(min=1, max=3, help="Effects at most that are sought together; more take longer. Default: 2."),
     ] = None,
     seed: Seed = 0,
     workers: Annotated[

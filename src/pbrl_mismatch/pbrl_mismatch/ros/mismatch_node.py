@@ -34,6 +34,12 @@ from pbrl_model.ros.conversions import models_from_msg
 from pbrl_model.ros.listener import MEMORY, RecordingListener
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+KNOWN = {
+    "mass_spread": ("how well the mass that was told is known, as a standard deviation of its logarithm", (1e-3, 3.0)),
+    "grasp_spread": ("how well the gripper's direction is known [rad]; 0: exactly", (0.0, 1.0)),
+    "outline_spread": ("how well each side of the outline is known [m]; 0: exactly", (0.0, 1.0)),
+}
+"""Parameters that say what a diagnosis may take for given: a sentence and the bounds of each."""
 
 
 class MismatchNode(Node):
@@ -60,6 +66,11 @@ class MismatchNode(Node):
         )
         diagnosing = declare(self, "diagnose", True, "whether to say what was left out, not only that something was")
         without: list[str] = declare(self, "without", [], "effects that the library does without", choices=EFFECTS)
+        usual, most = DiagnoseOptions(), "effects at most that are sought together"
+        known = {
+            name: declare(self, name, getattr(usual, name), text, limits) for name, (text, limits) in KNOWN.items()
+        }
+        together = declare(self, "most_together", usual.most_together, most, (1, 3))
         workers = declare(self, "workers", 1, "threads of a diagnosis", (1, 256))
         seed = declare(self, "seed", 0, "seed of every random draw", (0, 2**31 - 1))
         waits = "longest wait for the answer to a push that was asked for [s]"
@@ -67,7 +78,8 @@ class MismatchNode(Node):
         period = declare(self, "period", 0.1, "time between two looks at what has come [s]", (0.01, 1.0))
         memory = declare(self, "memory", MEMORY, "most that is kept of messages for a diagnosis [MB]", (1.0, 100_000.0))
         refuse_unknown(self)
-        chosen = DiagnoseOptions(without=tuple(without), workers=workers, seed=seed)
+        own = {**known, "most_together": together, "workers": workers, "seed": seed}
+        chosen = DiagnoseOptions(without=tuple(without), **own)
         self._doing, self._alarms = "watches; no alarm so far", 0
         self._mismatches = self.create_publisher(Mismatches, "mismatches", LATCHED)
         self.listener = RecordingListener(f"{self.get_name()}_listener", context, memory, self.get_namespace())
