@@ -43,6 +43,7 @@ from pbrl_mismatch.search.predictive import Verdict, predictive_test
 from pbrl_mismatch.search.told_baseline import ToldBaseline, told_baselines
 from pbrl_mismatch.search.weigh import Weighed
 from pbrl_mismatch.unknown.describe import describe_unknown
+from pbrl_mismatch.where.contacts import contact_notes
 from pbrl_mismatch.where.localise import localise
 from pbrl_model.errors import ModelError
 from pbrl_model.fitting.episodes import body_of, motions_of, usable_episodes
@@ -173,18 +174,22 @@ def diagnose(recording: Recording, options: DiagnoseOptions | None = None) -> Di
 
 
 def _diagnosed(
-    seed: np.random.SeedSequence,
-    recording: Recording,
-    name: str,
-    told: ToldBaseline | None,
-    options: DiagnoseOptions,
+    seed: np.random.SeedSequence, recording: Recording, name: str, told: ToldBaseline | None, options: DiagnoseOptions
 ) -> ObjectDiagnosis:
     """Diagnose one object of a recording; see `diagnose`."""
     track = track_of(recording, name)
     room = recording.room if len(recording.room) else None
     found = _diagnose_object(seed, track, lay_grips(recording, track), room, told, options)
     error = wrench_error(recording, track.motions, body_of(recording.bodies[name], track.motions[0].oriented))
-    return replace(found, notes=(*found.notes, *_poor_force(error)))
+    notes, where = [*found.notes, *_poor_force(error)], None
+    if found.mismatch:
+        try:
+            where = localise(track, found.baseline.row, recording)
+            notes += contact_notes(name, where.contacts)
+        except MismatchError as error:
+            notes.append(f"where the two part cannot be told: {error}")
+    report = {**found.report, "localisation": None if where is None else where.to_report()}
+    return replace(found, report=report, notes=tuple(notes))
 
 
 def _poor_force(error: float) -> tuple[str, ...]:
@@ -310,17 +315,11 @@ def _diagnose_object(
         "heldout": held_out_report(baseline, named, floor),
         "not_shown": [each.to_report() for each in hidden],
         "unknown_description": None,
-        "localisation": None,
     }
     notes = [sentence(track.object, mismatch, verdict, found), *found.notes, *missing_notes(track)]
     notes += note_on_unheard(track.unheard)
     if found.effects and baseline.score is None:
         notes.append(NOTHING_HELD_OUT)
-    if mismatch:
-        try:
-            report["localisation"] = localise(track, baseline.row).to_report()
-        except MismatchError as error:
-            notes.append(f"where the two part cannot be told: {error}")
     if mismatch and not found.effects:
         try:
             report["unknown_description"] = describe_unknown(rng, track, residual, baseline.row).to_report()

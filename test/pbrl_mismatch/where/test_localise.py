@@ -49,7 +49,7 @@ def test_a_drag_goes_by_the_motion_and_grows_with_speed(track: Any) -> None:
 def test_a_report_is_plain_json_and_the_holds_are_its_frame(track: Any) -> None:
     found = lacking(track, steady_x=-4.0)
     report = json.loads(json.dumps(found.to_report(), allow_nan=False))
-    assert set(report) == {"when", "changes", "stretches", "speed_power", "floor", "holds", "sentences"}
+    assert set(report) == {"when", "changes", "stretches", "speed_power", "floor", "holds", "contacts", "sentences"}
     assert len(report["holds"]) == len(track.motions)
     for start, end in report["when"]:
         assert any(hold["begin"] - 1e-6 <= start < end <= hold["end"] + 1e-6 for hold in report["holds"])

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_bag.types import Recording
 from pbrl_mismatch.activity import Interval, intervals
 from pbrl_mismatch.data.residual import residual_wrench
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.unknown.samples import Samples, apart, samples_of
 from pbrl_mismatch.where.axes import FRAMES, PARTS, axes_of
+from pbrl_mismatch.where.contacts import Contact, contacts_of
 from pbrl_mismatch.where.floor import FloorRegion, floor_region
 from pbrl_mismatch.where.partition import Partition, Stretch, partition
 
@@ -62,6 +64,7 @@ class Localisation:
         power: of the speed; None: the speed hardly varied while it was there.
         floor: the region that it goes by; None: it does not, or is all over.
         holds: in order.
+        contacts: what that is known was within touch while it was there.
     """
 
     found: Partition
@@ -69,6 +72,7 @@ class Localisation:
     power: Power | None
     floor: FloorRegion | None
     holds: tuple[Hold, ...]
+    contacts: tuple[Contact, ...] = ()
 
     @property
     def there(self) -> list[tuple[Stretch, tuple[Interval, ...]]]:
@@ -91,17 +95,19 @@ class Localisation:
                 "share_there": floor.share_there,
                 "passes": floor.passes,
             },
-            "holds": [{"begin": e.begin, "end": e.end, "share_there": e.share_there} for e in self.holds],
+            "holds": [asdict(each) for each in self.holds],
+            "contacts": [asdict(each) for each in self.contacts],
             "sentences": sentences_of(self),
         }
 
 
-def localise(track: Track, row: Array) -> Localisation:
+def localise(track: Track, row: Array, recording: Recording | None = None) -> Localisation:
     """Say where the wrench that a model lacks was.
 
     Args:
         track: what was recorded.
         row: (WIDTH,) of the model.
+        recording: with what else is known to be about; None: nothing is.
 
     Raises:
         MismatchError: the recording is too short.
@@ -123,6 +129,7 @@ def localise(track: Track, row: Array) -> Localisation:
         _power(samples, found),
         floor_region(samples, found),
         tuple(holds),
+        () if recording is None else contacts_of(recording, track, there),
     )
 
 
