@@ -21,7 +21,7 @@ def test_a_push_that_is_not_seen_to_end_is_diagnosed_after_a_while(
     monkeypatch.setattr(watcher, "LONGEST", math.inf)
     stream = Stream(write_recording(concealed_recording("floor_slope", 1, seconds=9.0), tmp_path / "bag"))
     stream.play(lambda: at_hand.asked)
-    stream.watcher.diagnose_again("table", stream.watcher.now)
+    stream.watcher.diagnose_again("table", stream.newest())
     stream.watcher.step()
     assert len(at_hand.asked) == 1, "it is still held"
     monkeypatch.setattr(watcher, "LONGEST", 0.0)
@@ -41,7 +41,7 @@ def test_what_was_begun_or_asked_for_on_another_clock_is_not_told(
     at_hand.lets = False
     stream.play()
     assert len(at_hand.asked) == 1 and stream.told[-1]
-    stream.watcher.diagnose_again("table", stream.watcher.now)
+    stream.watcher.diagnose_again("table", stream.newest())
     before = len(stream.told)
     stream.play(lambda: len(stream.told) > before and stream.told[-1])
     assert stream.told[before] == () and len(at_hand.asked) == 1

@@ -89,7 +89,7 @@ class Stream:
         kinds = {name: message_class(topic.type) for name, topic in loaded.topics.items()}
         self._messages = [Message(one.topic, kinds[one.topic], one.data) for one in loaded.messages]
         self._heard = Heard(10**9)
-        self.follow, self.fresh = self._heard.follow, self._heard.fresh
+        self.follow, self.fresh, self.newest = self._heard.follow, self._heard.fresh, self._heard.newest
         self.told: list[tuple[Found, ...]] = []
         self.watcher = watcher.Watcher(
             MismatchMonitor(MonitorOptions(gather=1.0)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 import subprocess
 import sys
@@ -11,11 +12,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from pbrl_bag.errors import BagError
 from pbrl_bag.types import Recording
+from pbrl_mismatch.data.residual import ResidualWrench
 from pbrl_mismatch.diagnose import diagnose
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.options import DiagnoseOptions
+from pbrl_mismatch.unknown.describe import SURE
 from pbrl_model.errors import ModelError
 
 BASELINES: Mapping[str, tuple[str, ...]] = {
@@ -29,6 +34,8 @@ CHILD = "from pbrl_mismatch.online.diagnosing import main; main()"
 """Not with `-m`: what it pickles would be of a module `__main__`."""
 PATIENCE = 2.0
 """Waited for a process that was told to end [s]."""
+EVERY = 0.3
+"""Between two forces that are told [s]."""
 Job = tuple[Recording, str, DiagnoseOptions]
 """(recording, object, options)"""
 
@@ -43,6 +50,7 @@ class Diagnosed:
         verdict: in a sentence, or why there is none.
         notes: what must not be read into it.
         next_push: in the form of `report.json`'s `next_experiment`, or None where there is nothing to tell apart.
+        forces: (x, y, fx, fy) [m, N] in world where the model surely lacks a force, in order of time.
     """
 
     object: str
@@ -50,6 +58,7 @@ class Diagnosed:
     verdict: str
     notes: tuple[str, ...] = ()
     next_push: Mapping[str, Any] | None = None
+    forces: tuple[tuple[float, float, float, float], ...] = ()
 
 
 def options_for(options: DiagnoseOptions, name: str, model_class: str) -> DiagnoseOptions:
@@ -64,7 +73,18 @@ def diagnose_object(recording: Recording, name: str, options: DiagnoseOptions) -
     except (BagError, ModelError, MismatchError) as error:
         return Diagnosed(name, {}, f"{name}: not diagnosed: {' '.join(str(error).split())}")
     push = None if found.next_push is None else found.next_push.to_report()
-    return Diagnosed(name, dict(found.report), found.notes[0], tuple(found.notes[1:]), push)
+    return Diagnosed(name, dict(found.report), found.notes[0], tuple(found.notes[1:]), push, _forces(found.residual))
+
+
+def _forces(residual: ResidualWrench) -> tuple[tuple[float, float, float, float], ...]:
+    """Return places and forces at the moments, `EVERY` apart, at which a left-out wrench is told from none."""
+    told, last = [], -math.inf
+    for row in np.flatnonzero(residual.significance > SURE).tolist():
+        if abs(float(residual.time[row]) - last) >= EVERY:
+            last = float(residual.time[row])
+            (x, y), (fx, fy) = residual.state[row, :2].tolist(), residual.world[row, :2].tolist()
+            told.append((x, y, fx, fy))
+    return tuple(told)
 
 
 class DiagnosisWorker:

@@ -17,6 +17,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
 
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
@@ -27,7 +28,8 @@ from pbrl_mismatch.online.found import Found
 from pbrl_mismatch.online.monitor import MismatchMonitor
 from pbrl_mismatch.online.options import MonitorOptions
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_mismatch.ros.conversions import mismatches_to_msg, push_to_msg
+from pbrl_mismatch.ros.conversions import mismatches_to_msg, push_to_msg, stamp_of
+from pbrl_mismatch.ros.markers import mismatch_markers
 from pbrl_mismatch.ros.watcher import Watcher
 from pbrl_model.errors import ModelError
 from pbrl_model.ros.conversions import models_from_msg
@@ -43,7 +45,7 @@ KNOWN = {
 
 
 class MismatchNode(Node):
-    """Watches `/object_models` and the streams; publishes `/mismatches`, the alarm at once, the diagnosis later.
+    """Watches `/object_models` and the streams; publishes `/mismatches`, alarms at once and diagnoses later.
 
     Raises:
         BagError: a wrong parameter.
@@ -82,6 +84,7 @@ class MismatchNode(Node):
         chosen = DiagnoseOptions(without=tuple(without), **own)
         self._doing, self._alarms = "watches; no alarm so far", 0
         self._mismatches = self.create_publisher(Mismatches, "mismatches", LATCHED)
+        self._markers = self.create_publisher(MarkerArray, "mismatches/markers", LATCHED)
         self.listener = RecordingListener(f"{self.get_name()}_listener", context, memory, self.get_namespace())
         self._watcher = Watcher(
             MismatchMonitor(monitor),
@@ -119,7 +122,7 @@ class MismatchNode(Node):
         if not self._pusher.service_is_ready():
             response.message = "expected somebody who offers /push, a robot or a simulator; nobody does"
             return response
-        since = self._watcher.now
+        since = self.listener.newest()  # a hold that ended before was none of this push
         done = await self._pushed(push_to_msg(push))
         if done is None:
             late = f"the push of {push['object']} has not ended within {self._patience:g} s"
@@ -145,6 +148,7 @@ class MismatchNode(Node):
         self._alarms = len(entries)
         self._doing = f"alarm: {', '.join(entry.alarm.object for entry in entries)}" if entries else "watches; no alarm"
         self._mismatches.publish(mismatches_to_msg(entries, stamp))
+        self._markers.publish(mismatch_markers(entries, stamp_of(stamp)))
 
     def destroy_node(self) -> None:
         """Stop watching and listening with the node."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -64,7 +63,6 @@ class Watcher:
         self._worker = DiagnosisWorker()
         self._gathering: dict[str, Alarm] = {}
         self._asked: dict[str, tuple[float, float]] = {}
-        self._now = -math.inf
         self._given: dict[str, Posterior] = {}
         self._said: dict[str, str] = {}
         self._lock = threading.Lock()
@@ -93,11 +91,6 @@ class Watcher:
         """Return the push that would tell most of what was found apart, in the form of `report.json`."""
         return self._findings.next_push
 
-    @property
-    def now(self) -> float:
-        """Return the newest stamp that was heard [s], minus infinity before the first; safe from any thread."""
-        return self._now
-
     def diagnose_again(self, name: str, since: float) -> None:
         """Diagnose an object anew with all that was heard, once it was let go of; safe from any thread.
 
@@ -119,7 +112,6 @@ class Watcher:
         """Take in what has come, test, begin diagnoses that are due, and tell what is new."""
         if self._take_messages():
             self._heard_at = time.monotonic()
-        self._now = self._live.now
         with self._lock:
             given, self._given = self._given, {}
         self._monitor.give(given, self._live.now)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import threading
 from collections import deque
@@ -101,6 +102,11 @@ class Heard:
         """Return everything that is kept: scene and grasps, then the rest in order."""
         with self._lock:
             return [*self._rare, *self._kept, *(message for _, message in self._recent)]
+
+    def newest(self) -> float:
+        """Return the newest stamp [s], minus infinity before the first."""
+        with self._lock:
+            return max(self._last.values(), default=-math.inf)
 
     def add(self, message: Message) -> list[str]:
         """Take a message; return what somebody should be told."""

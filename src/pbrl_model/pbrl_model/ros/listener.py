@@ -93,6 +93,10 @@ class RecordingListener(Node):
         """Return how many messages have been heard, forgotten ones too."""
         return self._heard.count
 
+    def newest(self) -> float:
+        """Return the newest stamp that has been heard [s], minus infinity before the first."""
+        return self._heard.newest()
+
     def last(self, topic: str) -> Any | None:
         """Return the last message of a topic, or None."""
         entry = self._last.get(topic)
