@@ -41,18 +41,18 @@ from pbrl_control.ros.conversions import expected_to_msg, twist_to_msg
 from pbrl_control.ros.floor_conversions import fixed_from_msg, room_from_msg
 from pbrl_control.ros.qos import COMMANDS, LATCHED
 from pbrl_control.settings import ControllerSettings, load_section
-from pbrl_model.errors import ModelError
 from pbrl_model.ros.listener import MEMORY, RecordingListener
-from pbrl_namo.beliefs.belief import ObjectBelief
 from pbrl_namo.errors import NamoError
 from pbrl_namo.executive import NamoExecutive, OpenByFreeSpace, Order, State, status_of
+from pbrl_namo.executive.jobs import Belief
 from pbrl_namo.executive.step import rest
 from pbrl_namo.executive.table import ENDED
-from pbrl_namo.ros.conversions import belief_from_msg, goal_from_pose, goal_from_text, masses_from_msg, status_to_msg
+from pbrl_namo.ros.conversions import goal_from_pose, goal_from_text, masses_from_msg, status_to_msg
 from pbrl_namo.ros.goal_server import GoalServer
 from pbrl_namo.ros.hearing import JOINT_STATES, SHARE, Hearing
 from pbrl_namo.ros.markers import Drawing, draw
 from pbrl_namo.ros.thinker import NodeThinker
+from pbrl_namo.ros.told_models import ToldModels
 
 GONE = 1.0
 """Silence after which somebody counts as gone [s]."""
@@ -84,9 +84,10 @@ class NamoNode(Node):
         self._thinker = NodeThinker(self._listener.kept)
         self._kinematics: RobotKinematics | None = None
         self._executive: NamoExecutive | None = None
-        self._beliefs: dict[str, ObjectBelief] = {}
+        self._beliefs: dict[str, Belief] = {}
         self._scene: Scene | None = None
         self._models: ObjectModels | None = None
+        self._told_models = ToldModels()
         self._goals: GoalServer | None = None  # offered when the robot is known: who sees it may send goals
         self._state: State | None = None
         self._paused = ""
@@ -172,20 +173,18 @@ class NamoNode(Node):
         self._take_models()
 
     def _take_models(self) -> None:
-        """Believe what others have learned, once outlines are known too; each message once."""
+        """Believe what others have learned, once outlines are known too."""
         if self._models is None or self._scene is None:
             return
         models, self._models = self._models.models, None
-        for model in models:
-            try:
-                belief = belief_from_msg(model, self._scene)
-            except (ModelError, NamoError, ControlError) as error:
-                self.get_logger().error(f"model of {model.object!r} is left aside: {error}")
-                continue
-            if belief is not None:
-                self._beliefs[model.object] = belief
-                if self._executive is not None:
-                    self._executive.believe(model.object, belief)
+        for name, belief in self._told_models.news(models, self._scene, self._believed, self.get_logger().error):
+            self._beliefs[name] = belief
+            if self._executive is not None:
+                self._executive.believe(name, belief)
+
+    def _believed(self, name: str) -> Belief | None:
+        beliefs = self._beliefs if self._executive is None else self._executive.mission.beliefs
+        return beliefs.get(name)
 
     def _tell_scene(self) -> None:
         if self._executive is not None and self._scene is not None:

@@ -1,0 +1,75 @@
+"""The node by itself, without its process for thoughts: what it takes in of what others say."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rclpy
+from geometry_msgs.msg import Point
+from pbrl_msgs.msg import Body, ObjectModel, ObjectModels, Scene
+from std_msgs.msg import String
+
+from pbrl_bringup.graph import free_domain
+from pbrl_model.parameters import KERNEL_COLUMNS
+from pbrl_namo.beliefs.stops import Stop
+from pbrl_namo.ros import namo_node
+
+URDF = Path(__file__).resolve().parents[3] / "urdf/krang/krang.urdf"
+MASS = KERNEL_COLUMNS.index("mass")
+GOAL = np.array([2.0, 0.0, math.nan])
+
+
+class NoThoughts:
+    """In the place of the thinker's process."""
+
+    floor = None
+
+    def __init__(self, heard: object) -> None: ...
+
+    def close(self) -> None: ...
+
+
+@pytest.fixture
+def node(monkeypatch: pytest.MonkeyPatch) -> Iterator[namo_node.NamoNode]:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setattr(namo_node, "NodeThinker", NoThoughts)
+    with free_domain() as domain:
+        rclpy.init(domain_id=domain)
+        node = namo_node.NamoNode()
+        yield node
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def scene(room: tuple[tuple[float, float], ...] = ()) -> Scene:
+    corners = [Point(x=x, y=y) for x, y in ((-0.5, -0.4), (0.5, -0.4), (0.5, 0.4), (-0.5, 0.4))]
+    table = Body(name="table", footprint=corners, height=0.75, nominal_mass=33.0, movable=True)
+    return Scene(bodies=[table], room=[Point(x=x, y=y) for x, y in room])
+
+
+def models(mass: float) -> ObjectModels:
+    told = ObjectModel(object="table", model_class="free", parameters=["mass"], units=["kg"])
+    told.draws, told.samples, told.mean, told.sd = 2, [mass, mass], [mass], [0.0]
+    return ObjectModels(models=[told])
+
+
+def test_what_learners_say_again_takes_away_nothing_that_was_found_out_since(node: namo_node.NamoNode) -> None:
+    node._on_description(String(data=URDF.read_text(encoding="utf-8")))
+    node._on_scene(scene())
+    node._on_models(models(20.0))
+    node._aim(GOAL, 0)
+    beliefs = node._executive.mission.beliefs
+    assert beliefs["table"].rows[0, MASS] == 20.0
+    wall = Stop(np.array([0.5, 0.0]), np.array([1.0, 0.0]), 0.1)
+    repaired = replace(beliefs["table"], rows=1.5 * beliefs["table"].rows, stops=(wall,))
+    node._executive.believe("table", repaired)  # as its own learning does
+    node._on_models(models(20.0))
+    assert beliefs["table"] is repaired, "it was said before"
+    node._on_models(models(25.0))
+    assert beliefs["table"].rows[0, MASS] == 25.0, "news"
+    assert beliefs["table"].stops == (wall,), "it met something, whatever it weighs"
