@@ -229,6 +229,17 @@ def test_a_fetch_looks_around_and_says_what_it_does_not_see(spin_with, push_post
     assert node.ended.done()
 
 
+@pytest.mark.parametrize("spin_with", [FETCH], indirect=True)
+def test_a_scene_whose_room_is_none_is_left_aside_before_the_robot_is_known(spin_with, root: Path) -> None:
+    node, _, _ = spin_with(PushNode)
+    (hear,) = (each.callback for each in node.subscriptions if each.topic_name == "/scene")
+    corners = [Point(x=x, y=y) for x, y in ((-0.4, -0.7), (0.4, -0.7), (0.4, 0.7), (-0.4, 0.7))]
+    hear(Scene(bodies=[Body(name="table_a", footprint=corners, height=0.77, movable=True)], room=corners[:1]))
+    assert node._scene is None
+    node._on_description(String(data=(root / "urdf/krang/krang.urdf").read_text()))
+    assert node._fetch is not None
+
+
 @pytest.mark.parametrize("spin_with", [["-p", "push_node:trajectory:=turn_about_caster"]], indirect=True)
 def test_a_trajectory_is_followed_as_the_learned_model_allows(spin_with, push_posture: Posture) -> None:
     node, world, until = spin_with(PushNode)

@@ -73,3 +73,18 @@ def test_what_learners_say_again_takes_away_nothing_that_was_found_out_since(nod
     node._on_models(models(25.0))
     assert beliefs["table"].rows[0, MASS] == 25.0, "news"
     assert beliefs["table"].stops == (wall,), "it met something, whatever it weighs"
+
+
+@pytest.mark.parametrize("room", [((0.0, 0.0),), ((0.0, 0.0), (1.0, math.nan), (0.0, 1.0))])
+def test_a_scene_without_a_room_as_it_should_be_is_left_aside_whole(
+    node: namo_node.NamoNode, room: tuple[tuple[float, float], ...]
+) -> None:
+    (hear,) = (each.callback for each in node.subscriptions if each.topic_name == "/scene")
+    node._on_description(String(data=URDF.read_text(encoding="utf-8")))
+    hear(scene(room))
+    assert not node._hearing.percept(0.0).bodies
+    node._aim(GOAL, 0)
+    assert "the scene" in node._executive.view.blind(0.0)
+    hear(scene(((-3.0, -3.0), (3.0, -3.0), (0.0, 3.0))))
+    assert "the scene" not in node._executive.view.blind(0.0)
+    assert list(node._hearing.percept(0.0).bodies) == ["table"]

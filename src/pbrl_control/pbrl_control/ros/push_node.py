@@ -94,6 +94,7 @@ class PushNode(Node):
         self._grips: dict[str, Grip] = {}
         self._bodies: dict[str, BodyShape] = {}
         self._scene: Scene | None = None
+        self._floor: tuple[Array | None, dict[str, Array]] | None = None
         self._learned: ObjectModel | None = None
         self._share = 1.0
         self._phase = self._failure = ""
@@ -175,15 +176,16 @@ class PushNode(Node):
             self._fetch.odometry(*odometry_from_msg(message))
 
     def _on_scene(self, message: Scene) -> None:
-        self._bodies, self._scene = bodies_from_msg(message), message
+        floor = room_from_msg(message), fixed_from_msg(message)  # refuses what is no scene
+        self._bodies, self._scene, self._floor = bodies_from_msg(message), message, floor
         self._tell_scene()
         self._take_model()
 
     def _tell_scene(self) -> None:
         """Tell a fetch what wears no tag, and watch what does."""
-        if self._fetch is None or self._scene is None:
+        if self._fetch is None or self._scene is None or self._floor is None:
             return
-        self._fetch.told(room_from_msg(self._scene), fixed_from_msg(self._scene))
+        self._fetch.told(*self._floor)
         for body in self._scene.bodies:
             if body.movable:
                 self._listen_to_tag(body.name)

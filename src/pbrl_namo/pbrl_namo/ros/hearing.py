@@ -44,7 +44,7 @@ class Hearing:
     Args:
         node: that hears.
         diagnostics: of the node.
-        scene: is told of each /scene.
+        scene: is told of each /scene; may refuse it.
         odometry: is told when odometry was taken [s], and the pose (3,) of `base` in `odom` [m, rad].
         alive: is told of each sign of life of `JOINT_STATES` and `SHARE`, and when it came on the steady clock [s].
     """
@@ -88,10 +88,11 @@ class Hearing:
             self._subscribe(PoseStamped, f"ar_tags/{name}/pose", partial(self._on_tag, name), NEWEST)
 
     def _on_scene(self, message: Scene) -> None:
-        self._bodies = bodies_from_msg(message)
-        for name in movable_from_msg(message):
+        bodies, movable = bodies_from_msg(message), movable_from_msg(message)
+        self._scene(message)  # refuses what is no scene: then nothing of it is taken in
+        self._bodies = bodies
+        for name in movable:
             self._listen_to_tag(name)
-        self._scene(message)
 
     def _on_grasps(self, message: Grasps) -> None:
         self._grips = grips_from_msg(message)

@@ -86,6 +86,7 @@ class NamoNode(Node):
         self._executive: NamoExecutive | None = None
         self._beliefs: dict[str, Belief] = {}
         self._scene: Scene | None = None
+        self._floor: tuple[Array | None, dict[str, Array], dict[str, float]] | None = None
         self._models: ObjectModels | None = None
         self._told_models = ToldModels()
         self._goals: GoalServer | None = None  # offered when the robot is known: who sees it may send goals
@@ -160,6 +161,8 @@ class NamoNode(Node):
         self._aim(goal, self._seed)
 
     def _on_scene(self, message: Scene) -> None:
+        """Take in a scene; raises ControlError, and keeps the one before, where it has no room as it should."""
+        self._floor = room_from_msg(message), fixed_from_msg(message), masses_from_msg(message)
         self._scene = message
         self._tell_scene()
         self._take_models()
@@ -187,9 +190,8 @@ class NamoNode(Node):
         return beliefs.get(name)
 
     def _tell_scene(self) -> None:
-        if self._executive is not None and self._scene is not None:
-            scene = self._scene
-            self._executive.told(room_from_msg(scene), fixed_from_msg(scene), masses_from_msg(scene))
+        if self._executive is not None and self._floor is not None:
+            self._executive.told(*self._floor)
 
     # Goals
 
