@@ -15,8 +15,10 @@ from pbrl_msgs.msg import Body, ObjectModel, ObjectModels, Scene
 from std_msgs.msg import String
 
 from pbrl_bringup.graph import free_domain
+from pbrl_control.percept import Percept
 from pbrl_model.parameters import KERNEL_COLUMNS
 from pbrl_namo.beliefs.stops import Stop
+from pbrl_namo.executive.mission import job_seed
 from pbrl_namo.ros import namo_node
 
 URDF = Path(__file__).resolve().parents[3] / "urdf/krang/krang.urdf"
@@ -88,3 +90,14 @@ def test_a_scene_without_a_room_as_it_should_be_is_left_aside_whole(
     hear(scene(((-3.0, -3.0), (3.0, -3.0), (0.0, 3.0))))
     assert "the scene" not in node._executive.view.blind(0.0)
     assert list(node._hearing.percept(0.0).bodies) == ["table"]
+
+
+def test_a_goal_under_way_takes_the_seed_of_the_next(node: namo_node.NamoNode) -> None:
+    node._on_description(String(data=URDF.read_text(encoding="utf-8")))
+    node._aim(GOAL, 3)
+    first = node._executive.mission
+    node._aim(-GOAL, 8)
+    node._executive.tick(1.0, Percept(None, {}, {}, {}, {}))
+    second = node._executive.mission
+    assert second is not first
+    assert second._draw() == job_seed(8, 1)

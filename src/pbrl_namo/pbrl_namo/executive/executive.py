@@ -110,9 +110,15 @@ class NamoExecutive:
         self._clock_set_back = False
         self._next_goal: Array | None = None
 
-    def aim(self, goal: Array) -> None:
-        """Take another goal, in mid-action or after the end; raises NamoError where it is no place."""
+    def aim(self, goal: Array, seed: int | None = None) -> None:
+        """Take another goal, in mid-action or after the end; raises NamoError where it is no place.
+
+        Args:
+            goal: (3,) in `world`; heading NaN: any [m, rad].
+            seed: of every draw on the way there; None: as of the goal before.
+        """
         self._next_goal, self._cancel = checked_goal(goal), ""
+        self._seed = self._seed if seed is None else seed
 
     def cancel(self, reason: str = "cancelled") -> None:
         """End it: let go of what is held, then rest."""

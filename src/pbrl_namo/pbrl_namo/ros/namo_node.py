@@ -196,11 +196,11 @@ class NamoNode(Node):
     # Goals
 
     def _aim(self, goal: Array, seed: int) -> None:
-        """Set out for a goal; under way the draws go on as they were begun."""
+        """Set out for a goal, at once or, under way, at the next tick."""
         assert self._kinematics is not None
         now = time.monotonic()
         if self._executive is not None and self._executive.state not in ENDED:
-            self._executive.aim(goal)
+            self._executive.aim(goal, seed)
             return
         if self._executive is not None:
             self._beliefs.update(self._executive.mission.beliefs)
