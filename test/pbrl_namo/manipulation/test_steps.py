@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import shapely
@@ -32,13 +34,17 @@ def turned_only() -> NamoScene:
 
 
 def searched(scene: NamoScene, name: str, belief: ObjectBelief, been: tuple[Array, ...] = ()) -> tuple[Step, ...]:
+    return search_of(scene, name, belief, been).find()
+
+
+def search_of(scene: NamoScene, name: str, belief: ObjectBelief, been: tuple[Array, ...] = ()) -> StepSearch:
     free = free_space(scene)
     start, end = free.index(scene.start), free.index(scene.goal)
     assert start is not None and end is not None
     study = Study.of(scene, name, {name: belief}, np.random.default_rng(0), QUICK)
     aim = OpenWay(scene.movable[name], scene.goal[:2], scene.goal[None, :2], free.radius)
     yard = Yard.of(scene, free.radius, QUICK.cell)
-    return StepSearch(yard, free, Opening(start, end, name), study, aim, QUICK, been).find()
+    return StepSearch(yard, free, Opening(start, end, name), study, aim, QUICK, been)
 
 
 def walked(scene: NamoScene, name: str, steps: tuple[Step, ...]) -> NamoScene:
@@ -129,8 +135,21 @@ def test_it_is_not_let_go_again_where_it_has_been() -> None:
     steps = searched(scene, "long", belief)
     been = tuple(step.end for step in steps[:-1])
     assert been
-    for step in searched(scene, "long", belief, been)[:-1]:
-        assert all(np.abs(step.end - pose).max() > 1e-3 for pose in been)
+    for turns in (0.0, math.tau):  # a tag's heading is within half a turn, a step's end may be beyond
+        told = tuple(pose + np.array([0.0, 0.0, turns]) for pose in been)
+        for step in searched(scene, "long", belief, told)[:-1]:
+            assert all(np.abs(step.end - pose).max() > 1e-3 for pose in been)
+
+
+@pytest.mark.parametrize("pinning", [True, False], ids=["turned only", "anywhere"])
+def test_headings_on_both_sides_of_half_a_turn_are_looked_at_as_one(pinning: bool) -> None:
+    scene = turned_only()
+    thing = scene.movable["long"]
+    search = search_of(scene, "long", pinned(thing, *FAR_CASTER) if pinning else rolling(thing))
+    keys = [search._key(np.array([1.0, 1.0, turn])) for turn in (math.pi - 0.004, 0.004 - math.pi, 0.004 + math.pi)]
+    assert keys[0] == keys[1] == keys[2]
+    around = [search._key(np.array([1.0, 1.0, turn])) for turn in np.linspace(-math.pi, math.pi, 1000)]
+    assert len(set(around)) == (126 if pinning else 42)
 
 
 def test_what_is_in_the_way_is_put_where_it_is_not() -> None:

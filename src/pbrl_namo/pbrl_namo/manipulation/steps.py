@@ -294,6 +294,8 @@ class StepSearch:
         return [(float(away), parts.step(k)) for away, k in zip(far, new, strict=True) if np.isfinite(away)]
 
     def _key(self, pose: Array) -> tuple[int, ...]:
-        """Return a box that a pose (3,) is in; poses in one are looked at as one."""
-        x, y, turn = (self._finer * pose).tolist()
-        return round(x / SAME_PLACE), round(y / SAME_PLACE), round(turn / SAME_TURN)
+        """Return a box that a pose (3,) is in, whole turns apart or not; poses in one are looked at as one."""
+        x, y = (self._finer * pose[:2]).tolist()
+        turn = self._finer * math.remainder(float(pose[2]), math.tau)
+        half = round(self._finer * math.pi / SAME_TURN)  # boxes that half a turn has: the last is the first, too
+        return round(x / SAME_PLACE), round(y / SAME_PLACE), round(turn / SAME_TURN) % (2 * half)
