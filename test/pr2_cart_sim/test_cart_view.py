@@ -91,7 +91,8 @@ def test_localisation_comes_late_and_is_unbiased_without_a_field():
     readings, delays = [], []
     for k in range(4000):
         time = k * 0.01
-        for reading in localiser.measure(time, np.array([time, 0.0, 0.0])):
+        for reading, reckoned in localiser.measure(time, np.array([time, 0.0, 0.0]), np.array([0.9 * time, 0.0, 0.0])):
+            assert reckoned[0] == 0.9 * reading.time
             readings.append(reading.pose - [reading.time, 0.0, 0.0])
             delays.append(time - reading.time)
     np.testing.assert_allclose(delays, 0.1, atol=1e-6)

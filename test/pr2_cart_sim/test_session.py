@@ -10,8 +10,9 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
 from bullet_sim.bristle import wrap
+from bullet_sim.client import Pose
 from bullet_sim.errors import SimError
-from bullet_sim.observations import GraspState, JointStates, KnownScene
+from bullet_sim.observations import GraspState, JointStates, KnownScene, Transforms
 from pr2_cart_sim.description import BODY_JOINTS
 from pr2_cart_sim.errors import Pr2Error
 from pr2_cart_sim.messages import MESSAGE_TYPES, to_messages
@@ -91,6 +92,20 @@ def test_odometry_and_localisation_are_near_the_truth(pushed):
     assert np.abs(last(seen, BaseOdometry).pose - pose).max() < 0.05
     assert last(seen, BaseOdometry).twist[0] == pytest.approx(SPEED, rel=0.25)
     assert np.abs(last(seen, Localisation).pose - pose).max() < 0.15
+
+
+def test_map_and_odometry_meet_at_the_moment_that_the_localiser_tells_of(make_scene, make_session, run):
+    session = make_session(make_scene(bodies={}, sensors={"localisation": {"latency": 0.3}}))
+    seen = run(session, 2.0, lambda: session.command_base(0.4, 0.0, 0.6))
+    reckoned = {round(one.time, 6): one.pose for one in seen if isinstance(one, BaseOdometry)}
+    told = {one.time: one.pose for one in seen if isinstance(one, Localisation)}
+    met = [one for one in seen if isinstance(one, Transforms) and one.children == ("odom",) and one.time in told]
+    assert len(met) == len(told) > 10
+    for frame in met:
+        odom = Pose(frame.positions[0], frame.quaternions[0])
+        x, y, theta = reckoned[round(frame.time, 6)]
+        np.testing.assert_allclose(odom.point([x, y, 0.0])[:2], told[frame.time][:2], atol=1e-9)
+        assert wrap(odom.yaw + theta - told[frame.time][2]) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_smaller_step_is_the_same_run(make_scene, make_session, run):

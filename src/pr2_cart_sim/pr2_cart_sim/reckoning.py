@@ -64,18 +64,27 @@ class Localiser:
         self._settings, self._rng = settings, rng
         self._field = BiasField(settings.bias, settings.bias_length, rng)
         self._ticker = Ticker(settings.rate)
-        self._underway: deque[tuple[float, Localisation]] = deque()
+        self._underway: deque[tuple[float, Localisation, Array]] = deque()
         spread = math.hypot(settings.sigma_xy, settings.bias / 2)
         self._sigma = np.array([spread, spread, settings.sigma_yaw])
 
-    def measure(self, time: float, true: Array) -> list[Localisation]:
-        """Take in the true pose (3,) of this step [s]; give the readings whose latency has passed."""
+    def measure(self, time: float, true: Array, reckoned: Array) -> list[tuple[Localisation, Array]]:
+        """Take in where the robot is; give the readings whose latency has passed.
+
+        Args:
+            time: of this step [s].
+            true: pose (3,) in `map`.
+            reckoned: pose (3,) in `odom`.
+
+        Returns:
+            Each reading, and the pose in `odom` (3,) of the moment that it tells of.
+        """
         settings = self._settings
         if self._ticker.due(time):
             pose = true + self._rng.normal(size=3) * [settings.sigma_xy, settings.sigma_xy, settings.sigma_yaw]
             pose[:2] += self._field.at(true[:2])
-            self._underway.append((time + settings.latency, Localisation(time, pose, self._sigma)))
+            self._underway.append((time + settings.latency, Localisation(time, pose, self._sigma), reckoned.copy()))
         arrived = []
         while self._underway and self._underway[0][0] <= time + SLACK:
-            arrived.append(self._underway.popleft()[1])
+            arrived.append(self._underway.popleft()[1:])
         return arrived

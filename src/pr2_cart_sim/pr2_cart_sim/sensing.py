@@ -156,8 +156,7 @@ class Sensing:
     def _localise(self, time: float) -> list[Observation]:
         """Tell the pose in the map, and where `odom` is, for that to be so."""
         seen: list[Observation] = []
-        for told in self._localiser.measure(time, self._robot.base_state()[0]):
-            x, y, theta = self._odometry.pose
+        for told, (x, y, theta) in self._localiser.measure(time, self._robot.base_state()[0], self._odometry.pose):
             turn = told.pose[2] - theta
             cos, sin = math.cos(turn), math.sin(turn)
             odom = told.pose - [cos * x - sin * y, sin * x + cos * y, theta]
