@@ -32,8 +32,8 @@ def pushed(seed: int, count: int, **concealed: object) -> tuple[list[Observation
         return heard, [session.push(push) for _ in range(count)]
 
 
-def places(heard: list[Observation]) -> np.ndarray:
-    return np.array([[each.time, *each.position[:2]] for each in heard if getattr(each, "tag", "") == "table"])
+def places(heard: list[Observation], tag: str = "table") -> np.ndarray:
+    return np.array([[each.time, *each.position[:2]] for each in heard if getattr(each, "tag", "") == tag])
 
 
 def test_a_push_is_told_as_a_robot_s_would_be() -> None:
@@ -64,6 +64,19 @@ def test_the_clock_goes_on_from_push_to_push_and_the_table_stays_where_it_was_le
     way = places(heard)
     between = way[(way[:, 0] > released + 0.2) & (way[:, 0] < taken)]
     assert len(between) > 10 and np.ptp(between[:, 1:], axis=0).max() < 0.03  # noise of the tags
+
+
+def test_what_was_pushed_before_gives_way_to_what_is_pushed_into_it() -> None:
+    size = {"kind": "plain_table", "size": [0.7, 1.2], "nominal_mass": 20.0}
+    tables = {"near": {**size, "pose": [-1.0, 0.0, 0.0]}, "far": {**size, "pose": [0.0, 0.0, 0.0]}}
+    room = Scene.model_validate({"name": "two", "room": {"outline": OUTLINE}, "bodies": tables})
+    heard: list[Observation] = []
+    with HandSession(room, seed=3, publish=heard.extend) as session:
+        assert session.push(straight_push("far", (-0.35, 0.0), (1.0, 0.0), 0.05, 1.0)) == "done"
+        before = {name: places(heard, name)[-1, 1] for name in tables}
+        assert session.push(straight_push("near", (-0.35, 0.0), (1.0, 0.0), 0.2, 4.0)) == "done"
+    for name in tables:
+        assert places(heard, name)[-1, 1] - before[name] > 0.3, name
 
 
 def test_the_same_seed_publishes_the_same_and_another_does_not() -> None:

@@ -202,17 +202,20 @@ class HandRun:
         return self._fallen() or "done"
 
     def one_more(self, push: HandPush) -> str:
-        """Do one push, the body kept in its place before and after; give the status.
+        """Do one push, all bodies kept in their places before and after; give the status.
 
         Nobody lets go of a table on a slope for as long as it takes to think about the next push.
         """
-        body = self._world.find(push.body)
-        body.park()
+        bodies = [self._world.find(name) for name in self._tagged]
+        for body in bodies:
+            body.park()
         if self._readings:
             self._carry(push)
         self._stand(STANDING)
+        for body in bodies:
+            body.unpark()
         lost = self._push(push)
-        if not lost:
+        for body in () if lost else bodies:
             body.park()
         self._stand(AFTERWARDS)
         return lost or self._fallen() or "done"
