@@ -205,6 +205,49 @@ def test_a_wheel_on_a_strut_feels_the_carpet(lab: Any) -> None:
     assert effect.acting(), "where no foot is on it"
 
 
+FLOORS = [[[-0.5, -3], [1, -3], [1, 3], [-0.5, 3]], [[-3, -3], [-0.5, -3], [-0.5, 3], [-3, 3]]]
+
+
+def test_from_one_tile_to_the_next_each_is_felt_where_it_is(lab: Any) -> None:
+    tiles = [{"polygon": FLOORS[0], "rolling_resistance": 0.004}, {"polygon": FLOORS[1], "rolling_resistance": 0.002}]
+    wheel = {"position": [0.0, 0.0], "load": 100.0}
+    world, body, _ = made(lab, {"floor_patch": tiles}, body=lab.table | {"pose": [-2.0, 0, 0]})
+    rolling, _, _ = made(lab, {"floor_patch": tiles, "wheel": {"table_a": wheel}}, body=PLAIN | {"pose": [-2, 0, 0]})
+    braked: list[float] = []
+    for fitting in rolling.find("table_a").fittings:
+        fitting.set_lever = braked.append
+    for x, lever in ((-2.0, 0.002), (0.2, 0.004), (-2.0, 0.002), (0.2, 0.004), (5.0, 0.00075)):
+        for each in (world, rolling):
+            number = each.client.body("table_a")
+            height = each.client.api.getBasePositionAndOrientation(number)[0][2]
+            each.client.api.resetBasePositionAndOrientation(number, [x, 0, height], [0, 0, 0, 1])
+            each.step()
+        np.testing.assert_allclose(body.casters.levers, lever, err_msg=str(x))
+        assert x in (-2.0, 5.0) or braked[-1] == lever
+    assert braked[-1] == 0.0 or braked[-1] == rolling.find("table_a").fittings[0].lever
+
+
+@pytest.mark.parametrize("floor", [1.0, 0.8])
+def test_a_block_on_two_tiles_has_their_mean_and_the_floor_s_factor_is_not_theirs(lab: Any, floor: float) -> None:
+    square = [[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]]
+    block = {
+        "kind": "block",
+        "polygon": square,
+        "height": 0.1,
+        "nominal_mass": 10.0,
+        "friction": 0.4,
+        "pose": [0, 0, 0],
+    }
+    halves = [[[-3, 0], [3, 0], [3, 3], [-3, 3]], [[-3, -3], [3, -3], [3, 0], [-3, 0]]]
+    tiles = [{"polygon": half, "friction": mu} for half, mu in zip(halves, (0.1, 0.2), strict=True)]
+    room = {"outline": [[-8, -8], [8, -8], [8, 8], [-8, 8]], "floor_friction": floor}
+    world = lab.world(lab.scene({"table_a": block}, concealed={"floor_patch": tiles}, room=room), seed=0)
+    lab.run(world, 0.2)
+    launch(world, vx=0.8)
+    lab.run(world, 0.2)
+    assert world.find("table_a").twist().linear[0] == pytest.approx(0.8 - 0.15 * GRAVITY * 0.2, rel=0.03)
+
+
 def test_a_place_is_in_a_polygon_or_not() -> None:
     bay = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.5), (0.0, 2.0)]
     assert contains(bay, 0.5, 0.5)

@@ -92,8 +92,8 @@ def effects_of(
         effects += _built_in(client, body, fitted.get(name, {}), concealed)
         effects += _around(client, body, concealed)
     # Tiles decide over the feet's friction after everything else.
-    bodies = list(furniture.values())
-    effects += [FloorPatch(client, bodies, patch, str(n)) for n, patch in enumerate(concealed.floor_patch)]
+    bodies, tiles = list(furniture.values()), list[FloorPatch]()
+    effects += [FloorPatch(client, bodies, patch, str(n), tiles) for n, patch in enumerate(concealed.floor_patch)]
     effects += [HiddenObstacle(client, furniture, body, str(n)) for n, body in enumerate(concealed.hidden_obstacle)]
     effects += [UnseenBody(client, furniture, body, str(n)) for n, body in enumerate(concealed.unseen_body)]
     if concealed.floor_slope is not None:

@@ -2,7 +2,7 @@
 
 The tile lies flush in the floor. Bullet meets the edge of one body beside another with a bump for whatever slides
 across it, so floor and tile are one plane, and a foot has the friction of what is under it: each foot by itself, with
-the load that it carries there.
+the load that it carries there. Where tiles overlap, the one that was laid last lies on top.
 """
 
 from __future__ import annotations
@@ -34,16 +34,31 @@ class FloorPatchSettings(Settings):
 
 
 class FloorPatch(Effect):
-    """One tile, for all that stands in the room."""
+    """One tile, for all that stands in the room.
+
+    Args:
+        client: the world.
+        bodies: what stands in it.
+        settings: what the tile is like.
+        target: its number.
+        tiles: those that are laid in this room, in their order; it puts itself there.
+    """
 
     name, unit = "floor_patch", "share of feet"
 
     def __init__(
-        self, client: BulletClient, bodies: list[Furniture], settings: FloorPatchSettings, target: str
+        self,
+        client: BulletClient,
+        bodies: list[Furniture],
+        settings: FloorPatchSettings,
+        target: str,
+        tiles: list[FloorPatch],
     ) -> None:
         """Lay the tile."""
         super().__init__(target)
-        self._client, self._settings = client, settings
+        self._client, self._settings, self._tiles = client, settings, tiles
+        tiles.append(self)
+        self._floor = client.floor_friction
         self._corners = [(float(x), float(y)) for x, y in settings.polygon]
         self._bodies = [body for body in bodies if body.feet or body.casters or isinstance(body.settings, Block)]
         self._inside: dict[str, float] = {}
@@ -80,12 +95,18 @@ class FloorPatch(Effect):
     def _roll(self, body: Furniture) -> list[float]:
         """Set the rolling resistance of casters."""
         assert body.casters is not None
-        on = np.array([contains(self._corners, x, y) for x, y, _ in body.casters.contacts()])
+        places = [(x, y) for x, y, _ in body.casters.contacts()]
+        on = np.array([contains(self._corners, *place) for place in places])
         was, own = self._rolled.get(body.name, np.zeros_like(on)), self._levers[body.name]
-        body.casters.levers[was & ~on] = own[was & ~on]
-        body.casters.levers[on] = self._settings.rolling_resistance
+        for wheel in np.flatnonzero(was | on):
+            body.casters.levers[wheel] = self._lever(*places[wheel], own[wheel])
         self._rolled[body.name] = on
         return [float(wheel) for wheel in on]
+
+    def _lever(self, x: float, y: float, own: float) -> float:
+        """Give the rolling resistance [m] of a wheel at a place (x, y) [m], which has its own on the plain floor."""
+        tiles = (tile for tile in reversed(self._tiles) if contains(tile._corners, x, y))
+        return next((tile._settings.rolling_resistance for tile in tiles), own)
 
     def _slide(self, body: Furniture) -> float:
         """Set the friction of a block, which has one coefficient, to the mean over what it stands on."""
@@ -95,9 +116,15 @@ class FloorPatch(Effect):
         share = placed.intersection(Polygon(self._corners)).area / placed.area
         if share == self._inside.get(body.name, 0.0):
             return float(share)
+        bare, felt, covered = placed, 0.0, 0.0
+        for tile in reversed(self._tiles):
+            part = bare.intersection(Polygon(tile._corners)).area / placed.area
+            felt, covered = felt + part * tile._settings.friction, covered + part
+            bare = bare.difference(Polygon(tile._corners))
         number = self._client.body(body.name)
         for link in range(-1, self._client.api.getNumJoints(number)):
-            friction = share * self._settings.friction + (1 - share) * own
+            # Bullet multiplies it by the floor's factor, which is no tile's.
+            friction = felt / self._floor + (1 - covered) * own
             self._client.api.changeDynamics(number, link, lateralFriction=friction)
         return float(share)
 
@@ -109,10 +136,10 @@ class FloorPatch(Effect):
         motion = self._motions[body.name]
         motion.look()
         for wheel in wheels:
-            on = contains(self._corners, *motion.point(wheel.place))
-            if on != (wheel in self._braked):
+            x, y = motion.point(wheel.place)
+            if contains(self._corners, x, y) != (wheel in self._braked):
                 self._braked ^= {wheel}
-                wheel.set_lever(self._settings.rolling_resistance if on else wheel.lever)
+                wheel.set_lever(self._lever(x, y, wheel.lever))
         return [float(wheel in self._braked) for wheel in wheels]
 
     def strength(self) -> float:
