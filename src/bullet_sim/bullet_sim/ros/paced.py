@@ -151,22 +151,20 @@ class PacedSimulator(Node):
         self._commands[f"/{topic}"] = command
 
         def heard(message: Any) -> None:
+            self._heard += 1
+            self._last_command = self._session.time  # a controller has spoken, whatever the link makes of it
             if self._faulty is None:
                 self._obey(command, message)
             else:
-                self._heard += 1
                 self._faulty.send(self._session.time, f"/{topic}", message)
 
         self.create_subscription(kind, topic, heard, COMMAND_QOS)
 
     def _obey(self, command: Callable[[Any], None], message: Any) -> None:
-        self._heard += 1
         try:
             command(message)
         except SimError as error:
             self.get_logger().warning(f"ignored: {error}", throttle_duration_sec=1.0)
-        else:
-            self._last_command = self._session.time
 
     def _grasp(
         self, session: TwoArmed, request: GraspObject.Request, response: GraspObject.Response
