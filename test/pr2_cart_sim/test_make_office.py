@@ -137,6 +137,19 @@ def test_shipped_offices_run(name, make_session, run):
         ({"peopel": {}}, "did you mean 'people'"),
         ({"models": {"cart": "cart.yaml"}}, "models: expected none"),
         ({"robot": {"holds": "cat"}}, "did you mean 'cart'"),
+        (
+            {"concealed": {"pose_bias": {"cart": {"offset": [0.1, 0]}}}},
+            r"concealed\.pose_bias\.cart: expected no fault",
+        ),
+        ({"concealed": {"time_offset": {"cart": {"delay": 0.1}}}}, r"concealed\.time_offset\.cart: expected no fault"),
+        (
+            {"sensors": {"checkerboard": {"source": "rendered", "dropout": 0.1}}},
+            "checkerboard: expected no dropout where",
+        ),
+        (
+            {"sensors": {"checkerboard": {"source": "rendered", "sigma_xy": 0}}},
+            "checkerboard: expected no sigma_xy where",
+        ),
     ],
 )
 def test_a_bad_office_is_one_line(make_scene, tmp_path, change, words):
@@ -148,6 +161,13 @@ def test_a_bad_office_is_one_line(make_scene, tmp_path, change, words):
     with pytest.raises(SimError, match=words) as caught:
         load_office(tmp_path / "bad.yaml")
     assert "\n" not in str(caught.value)
+
+
+def test_what_an_office_s_sensors_have_may_be_told(make_scene):
+    late = {"left": {"delay": 0.1}}
+    assert make_scene(concealed={"time_offset": late}).concealed.time_offset["left"].delay == 0.1
+    board = {"source": "rendered", "bias": 0.0, "rate": 5.0}
+    assert make_scene(sensors={"checkerboard": board}).sensors.checkerboard.rate == 5.0
 
 
 def test_unknown_office_and_board_name_the_nearest(make_scene):

@@ -12,6 +12,7 @@ from ament_index_python.packages import PackageNotFoundError, get_package_share_
 from pydantic import Field, model_validator
 
 from bullet_sim.catalogue import Body
+from bullet_sim.concealed.options import GRIPPERS
 from bullet_sim.errors import SimError, nearest
 from bullet_sim.scene import NAME, RobotStart, Scene
 from bullet_sim.settings import NonNegative, Positive, Settings, Vector2, Vector3, read_settings
@@ -108,6 +109,10 @@ class OfficeScene(Scene):
                 )
         if self.models:
             raise ValueError("models: expected none in an office, got some; only Krang's scenes have learned ones")
+        for effect in ("pose_bias", "time_offset"):
+            for name in getattr(self.concealed, effect):
+                if effect == "pose_bias" or name not in GRIPPERS:
+                    raise ValueError(f"concealed.{effect}.{name}: expected no fault of a tag: there are none in an office")
         twice = [name for name in self.clutter if name in self.bodies]
         if twice:
             raise ValueError(f"clutter.{twice[0]}: expected a name of its own, bodies has it too")

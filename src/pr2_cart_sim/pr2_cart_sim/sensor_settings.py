@@ -113,7 +113,8 @@ class BoardSettings(Settings):
     """A checkerboard on the cart, seen by the camera in the head.
 
     Attributes:
-        source: `noise`: the cart's pose with the errors below; `rendered`: found in a picture of it; `off`: no board.
+        source: `noise`: the cart's pose with the errors below; `rendered`: found in a picture of it, which has errors
+            enough: nothing is to be said of `sigma_xy`, `sigma_yaw`, `bias_yaw` and `dropout`; `off`: no board.
         rate: [Hz].
         sigma_xy: white noise of the cart's place in `base` [m].
         sigma_yaw: white noise of its heading [rad].
@@ -149,6 +150,15 @@ class BoardSettings(Settings):
     lines: Annotated[int, Field(ge=64, le=4096)] = 480
     field_of_view: Annotated[float, Field(ge=0.2, le=2.4)] = 1.05
     pixel_noise: NonNegative = 2.0
+
+    @model_validator(mode="after")
+    def _says_what_counts(self) -> Self:
+        more = sorted(self.model_fields_set & {"sigma_xy", "sigma_yaw", "bias_yaw", "dropout"})
+        if self.source == "rendered" and more:
+            raise ValueError(
+                f"expected no {more[0]} where the board is rendered: errors come from the pictures; leave it out"
+            )
+        return self
 
 
 class Pr2Sensors(Sensors):
