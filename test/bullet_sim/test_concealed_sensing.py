@@ -10,9 +10,10 @@ import pytest
 
 from bullet_sim.bristle import Bristle
 from bullet_sim.clamp import GripperSpec
-from bullet_sim.client import Pose, yaw_quaternion
+from bullet_sim.client import STEP, Pose, yaw_quaternion
 from bullet_sim.concealed.sensing import tag_camera, wrist_sensor
 from bullet_sim.concealed.sensor_faults import PoseBiasSettings, WrenchBiasSettings, WrenchFrameSettings
+from bullet_sim.errors import SimError
 from bullet_sim.hand_push import push_by_hand
 from bullet_sim.hand_recording import HandPath, HandPush, HandRecording
 
@@ -29,7 +30,7 @@ def recorded(lab: Any, concealed: dict[str, Any]) -> HandRecording:
 def wrenches(lab: Any, concealed: dict[str, Any], wrench: Any, seconds: float = 2.0) -> tuple[Any, Any]:
     """Stamps (n,) and readings (n, 6) of a noiseless sensor that feels one wrench."""
     scene = lab.scene({"table_a": PLAIN}, concealed=concealed, sensors={"wrist_ft": PLAIN_WRIST})
-    sensor = wrist_sensor(scene, "left", np.random.default_rng(0))
+    sensor = wrist_sensor(scene, "left", np.random.default_rng(0), STEP)
     readings = [sensor.measure(k / 400, np.array(wrench[:3]), np.array(wrench[3:])) for k in range(int(400 * seconds))]
     shown = [reading for reading in readings if reading is not None]
     table = np.array([np.concatenate([r.force, r.torque]) for r in shown])
@@ -55,6 +56,14 @@ def test_a_late_tag_shifts_its_own_stream_alone(lab: Any) -> None:
     np.testing.assert_allclose(tag.arrival - tag.time, 0.075, atol=1 / 400 + 1e-9)
     np.testing.assert_array_equal(late.tags["left_gripper"].position, clean.tags["left_gripper"].position)
     np.testing.assert_array_equal(late.wrench.force, clean.wrench.force)
+
+
+def test_a_sensor_faster_than_the_physics_is_refused_in_a_line(lab: Any) -> None:
+    fast = lab.scene({"table_a": PLAIN}, sensors={"wrist_ft": {"rate": 1000}})
+    with pytest.raises(SimError, match=r"sensors\.wrist_ft\.rate: expected at most 400 Hz, .*, got 1000 Hz"):
+        push_by_hand(fast, [HandPush("table_a", (-0.4, 0.3), PATH)], seed=5)
+    for step in (STEP, 1 / 300, 1 / 200):
+        wrist_sensor(lab.scene(sensors={"wrist_ft": {"rate": 1 / step}}), "left", np.random.default_rng(0), step)
 
 
 def test_an_offset_rises_and_a_drift_goes_on(lab: Any) -> None:
@@ -83,7 +92,7 @@ def test_a_turned_and_scaled_sensor_shows_the_same_wrench_in_its_own_axes(lab: A
 
 def test_the_other_sensor_has_no_fault(lab: Any) -> None:
     scene = lab.scene({"table_a": PLAIN}, concealed={"wrench_frame": {"left": {"scale": 1.5}}})
-    sensor = wrist_sensor(scene, "right", np.random.default_rng(0))
+    sensor = wrist_sensor(scene, "right", np.random.default_rng(0), STEP)
     reading = sensor.measure(0.0, np.array([100.0, 0, 0]), np.zeros(3))
     assert reading is not None
     assert reading.force[0] == pytest.approx(100.0, abs=2.0)

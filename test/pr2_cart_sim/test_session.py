@@ -206,6 +206,11 @@ def test_nothing_between_the_fingers_is_an_error(make_scene, make_session):
         make_session(make_scene(bodies={"cart": far}))
 
 
+def test_a_wrist_that_is_faster_than_the_physics_is_refused(make_scene, make_session):
+    with pytest.raises(SimError, match=r"sensors\.wrist_ft\.rate: expected at most 200 Hz"):
+        make_session(make_scene(sensors={"wrist_ft": {"rate": 250}}))
+
+
 def test_a_body_in_the_robots_place_is_refused(make_scene, make_session):
     near = make_scene().bodies["cart"].model_dump() | {"pose": [0.5, 0.0, 0.0]}
     with pytest.raises(SimError, match=r"robot\.pose: expected a place clear of cart"):

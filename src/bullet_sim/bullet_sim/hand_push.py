@@ -157,10 +157,10 @@ class HandRun:
     ) -> None:
         camera_rng, wrist_rng = rng.spawn(2)
         self._world, self._spec, self._side, self._heard = world, spec, side, heard
+        self._camera = tag_camera(world.scene, camera_rng)
+        self._wrist = wrist_sensor(world.scene, side, wrist_rng, world.client.step_time)
         *place, height = self._grasp_place(first)
         self._hand = Hand(world.client, spec, (place[0], place[1], place[2]), height)
-        self._camera = tag_camera(world.scene, camera_rng)
-        self._wrist = wrist_sensor(world.scene, side, wrist_rng)
         self._tagged = [name for name, body in world.scene.bodies.items() if not isinstance(body, Fixture)]
         self._truth = Ticker(TRUTH_RATE)
         self._grasps = [GraspChange(0.0, None, np.zeros(3))]

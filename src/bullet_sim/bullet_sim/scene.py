@@ -120,7 +120,7 @@ class WristSettings(Settings):
     """Wrist force-torque sensor, in its own axes with y along the gripper; defaults: Mini45 SI-290-10 on Krang.
 
     Attributes:
-        rate: [Hz].
+        rate: [Hz]; at most one reading a physics step, which simulators see to.
         force_noise: white noise [N].
         torque_noise: white noise [N m].
         force_bias: bound [N] of the constant offset of each run.

@@ -57,7 +57,7 @@ class Sensing:
             read_tags: finds tags in pictures, where the scene wants them rendered; None: pictures are published.
 
         Raises:
-            SimError: rendered tags that cannot be.
+            SimError: rendered tags that cannot be, or a wrist that is faster than the physics.
             KrangError: a reader of pictures, and no pictures.
         """
         rendered = world.scene.sensors.tags.source == "rendered"
@@ -72,7 +72,8 @@ class Sensing:
             TagCameras(world, self.tagged, camera_rng, read_tags) if rendered else tag_camera(world.scene, camera_rng)
         )
         self._wrists = {
-            side: wrist_sensor(world.scene, side, wrist_rng) for side, wrist_rng in zip(SIDES, wrist_rngs, strict=True)
+            side: wrist_sensor(world.scene, side, wrist_rng, world.client.step_time)
+            for side, wrist_rng in zip(SIDES, wrist_rngs, strict=True)
         }
         self._clock, self._joints = Ticker(CLOCK_RATE), Ticker(JOINT_RATE)
         self._odometer, self._markers = Ticker(ODOMETRY_RATE), Ticker(MARKER_RATE)

@@ -55,6 +55,9 @@ class Sensing:
             scene: says what they are like.
             specs: the fingers, by side.
             rng: of all draws.
+
+        Raises:
+            SimError: the scene wants a wrist that is faster than the physics.
         """
         base, tilt, wheels, place, hands, board, *wrists = rng.spawn(6 + len(SIDES))
         sensors, client = scene.sensors, office.world.client
@@ -67,7 +70,10 @@ class Sensing:
         self._odometry = Odometry(sensors.odometry, self._robot.base_state()[0], wheels)
         self._localiser = Localiser(sensors.localisation, place)
         self._hands = HandsEstimate(sensors.proprioception_bias, hands)
-        self._wrists = {side: wrist_sensor(scene, side, stream) for side, stream in zip(SIDES, wrists, strict=True)}
+        self._wrists = {
+            side: wrist_sensor(scene, side, stream, client.step_time)
+            for side, stream in zip(SIDES, wrists, strict=True)
+        }
         self._clock, self._joints = Ticker(CLOCK_RATE), Ticker(JOINT_RATE)
         self._odometer, self._palms = Ticker(sensors.odometry.rate), Ticker(HANDS_RATE)
         self._frames = RobotFrames(client, self._robot)

@@ -6,17 +6,26 @@ from numpy.random import Generator
 
 from bullet_sim.errors import SimError
 from bullet_sim.scene import Scene
-from bullet_sim.sensors import TagCamera, WristSensor
+from bullet_sim.sensors import SLACK, TagCamera, WristSensor
 
 
-def wrist_sensor(scene: Scene, side: str, rng: Generator) -> WristSensor:
+def wrist_sensor(scene: Scene, side: str, rng: Generator, step: float) -> WristSensor:
     """Make the force-torque sensor of a gripper.
 
     Args:
         scene: says what the sensor is like and what is wrong with it.
         side: the gripper, "left" or "right".
         rng: draws its offset and noise.
+        step: of the physics [s]; there is at most one reading in each.
+
+    Raises:
+        SimError: the scene wants more readings than there are steps.
     """
+    if scene.sensors.wrist_ft.rate * step > 1.0 + SLACK:
+        raise SimError(
+            f"sensors.wrist_ft.rate: expected at most {1.0 / step:.0f} Hz, one reading a physics step, "
+            f"got {scene.sensors.wrist_ft.rate:g} Hz"
+        )
     concealed = scene.concealed
     frame, drift = concealed.wrench_frame.get(side), concealed.wrench_bias.get(side)
     late = concealed.time_offset.get(side)
