@@ -111,13 +111,14 @@ def test_command_writes_and_refuses_in_a_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["make_office", str(path), "--people", "2"])
     main()
     assert len(load_office(path).people) == 2
-    monkeypatch.setattr("sys.argv", ["make_office", str(path), "--rooms", "1"])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    told = capsys.readouterr().err
-    assert ended.value.code == 2
-    assert told.count("\n") == 1
-    assert "rooms" in told
+    for key, value in (("rooms", "1"), ("seed", "-1")):
+        monkeypatch.setattr("sys.argv", ["make_office", str(path), f"--{key}", value])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        told = capsys.readouterr().err
+        assert ended.value.code == 2
+        assert told.count("\n") == 1
+        assert key in told
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in Path(office_folder()).glob("*.yaml")))

@@ -76,8 +76,10 @@ def write_office(path: Path, plan: OfficePlan, seed: int) -> None:
     """Write an office as a scene file, and its map in `maps/` beside it.
 
     Raises:
-        SimError: a file cannot be written.
+        SimError: the seed is below zero, or a file cannot be written.
     """
+    if seed < 0:
+        raise Pr2Error(f"seed: expected a number from zero on, got {seed}")
     grid, scene = make_office(plan, seed)
     maps = path.parent / "maps"
     try:

@@ -112,7 +112,9 @@ class OfficeScene(Scene):
         for effect in ("pose_bias", "time_offset"):
             for name in getattr(self.concealed, effect):
                 if effect == "pose_bias" or name not in GRIPPERS:
-                    raise ValueError(f"concealed.{effect}.{name}: expected no fault of a tag: there are none in an office")
+                    raise ValueError(
+                        f"concealed.{effect}.{name}: expected no fault of a tag: there are none in an office"
+                    )
         twice = [name for name in self.clutter if name in self.bodies]
         if twice:
             raise ValueError(f"clutter.{twice[0]}: expected a name of its own, bodies has it too")
