@@ -12,7 +12,6 @@ from std_msgs.msg import Float64MultiArray
 from bullet_sim.errors import SimError
 from bullet_sim.faults import Faults
 from bullet_sim.ros.paced import PacedSimulator
-from pbrl_bringup.graph import free_domain
 
 LATE = {"links": {"/commands": {"late": 0.1}}}
 
@@ -53,12 +52,10 @@ class Simulator(PacedSimulator):
 
 
 @pytest.fixture
-def context(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    with free_domain() as domain:
-        rclpy.init(domain_id=domain)
-        yield
-        rclpy.try_shutdown()
+def context(domain: int) -> Iterator[None]:
+    rclpy.init(domain_id=domain)
+    yield
+    rclpy.try_shutdown()
 
 
 @pytest.mark.parametrize("faults", [{}, LATE], ids=["sound", "late"])

@@ -14,7 +14,6 @@ from geometry_msgs.msg import Point
 from pbrl_msgs.msg import Body, ObjectModel, ObjectModels, Scene
 from std_msgs.msg import String
 
-from pbrl_bringup.graph import free_domain
 from pbrl_control.percept import Percept
 from pbrl_model.parameters import KERNEL_COLUMNS
 from pbrl_namo.beliefs.stops import Stop
@@ -37,15 +36,13 @@ class NoThoughts:
 
 
 @pytest.fixture
-def node(monkeypatch: pytest.MonkeyPatch) -> Iterator[namo_node.NamoNode]:
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+def node(domain: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[namo_node.NamoNode]:
     monkeypatch.setattr(namo_node, "NodeThinker", NoThoughts)
-    with free_domain() as domain:
-        rclpy.init(domain_id=domain)
-        node = namo_node.NamoNode()
-        yield node
-        node.destroy_node()
-        rclpy.try_shutdown()
+    rclpy.init(domain_id=domain)
+    node = namo_node.NamoNode()
+    yield node
+    node.destroy_node()
+    rclpy.try_shutdown()
 
 
 def scene(room: tuple[tuple[float, float], ...] = ()) -> Scene:
