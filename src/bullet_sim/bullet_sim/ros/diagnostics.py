@@ -47,6 +47,11 @@ class PaceDiagnostics:
             values=[KeyValue(key=key, value=value) for key, value in values.items()],
         )
 
+    def keep_up(self) -> None:
+        """Tell, if it is time to: for a callback that keeps the node's executor, and with it the timer, waiting."""
+        if time.monotonic() - self._last[0] >= PERIOD:
+            self._tell()
+
     def _tell(self) -> None:
         message = DiagnosticArray(status=[self.status(time.monotonic())])
         message.header.stamp = self._node.get_clock().now().to_msg()

@@ -48,7 +48,7 @@ class HandNode(Node):
         rate = "simulated seconds per second; 0: as fast as possible"
         self._rate: float = declare(self, "rate", 1.0, rate, (0.0, 1000.0))
         refuse_unknown(self)
-        self._stop, self._origin, self._at = stop, time.monotonic(), 0.0
+        self._stop, self._origin, self._at, self._pushes = stop, time.monotonic(), 0.0, 0
         self._session = HandSession(load_scene(scene), seed=seed, publish=self._publish)
         types = message_types(self._session.tagged)
         wanted = {*TOPICS, "/ar_tags/left_gripper/pose", *(f"/ar_tags/{name}/pose" for name in self._session.tagged)}
@@ -61,7 +61,6 @@ class HandNode(Node):
         }
         self._publish(self._session.latched())
         self.create_service(PushObject, "push", self._push)
-        self._pushes = 0
         # Its time stands still between pushes: no pace is too slow.
         self._diagnostics = PaceDiagnostics(self, lambda: self._at, 0.0, lambda: self._pushes)
 
@@ -84,6 +83,8 @@ class HandNode(Node):
             for topic, message in to_messages(observation):
                 self._outputs[topic].publish(message)
         self._at = next((each.time for each in news if isinstance(each, ClockTick)), self._at)
+        if self._pushes:
+            self._diagnostics.keep_up()  # a push is made in a callback
         due = self._origin + self._at / self._rate if self._rate else 0.0
         if self._stop.wait(max(due - time.monotonic(), 0.0)):
             raise KrangError("the simulator was stopped in the middle of the push")
