@@ -45,8 +45,8 @@ def node(domain: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[namo_node.Nam
     rclpy.try_shutdown()
 
 
-def scene(room: tuple[tuple[float, float], ...] = ()) -> Scene:
-    corners = [Point(x=x, y=y) for x, y in ((-0.5, -0.4), (0.5, -0.4), (0.5, 0.4), (-0.5, 0.4))]
+def scene(room: tuple[tuple[float, float], ...] = (), wide: float = 0.5) -> Scene:
+    corners = [Point(x=x, y=y) for x, y in ((-wide, -0.4), (wide, -0.4), (wide, 0.4), (-wide, 0.4))]
     table = Body(name="table", footprint=corners, height=0.75, nominal_mass=33.0, movable=True)
     return Scene(bodies=[table], room=[Point(x=x, y=y) for x, y in room])
 
@@ -72,6 +72,9 @@ def test_what_learners_say_again_takes_away_nothing_that_was_found_out_since(nod
     node._on_models(models(25.0))
     assert beliefs["table"].rows[0, MASS] == 25.0, "news"
     assert beliefs["table"].stops == (wall,), "it met something, whatever it weighs"
+    node._on_scene(scene(wide=0.9))
+    node._on_models(models(25.0))
+    assert beliefs["table"].footprint[:, 0].max() == 0.9, "it is another table"
 
 
 @pytest.mark.parametrize("room", [((0.0, 0.0),), ((0.0, 0.0), (1.0, math.nan), (0.0, 1.0))])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
+import numpy as np
 from pbrl_msgs.msg import ObjectModel, Scene
 
 from pbrl_control.errors import ControlError
@@ -22,7 +23,7 @@ class ToldModels:
     """
 
     def __init__(self) -> None:
-        self._last: dict[str, tuple[tuple[str, ...], bytes]] = {}
+        self._last: dict[str, ObjectBelief] = {}
 
     def news(
         self,
@@ -35,21 +36,27 @@ class ToldModels:
 
         Args:
             models: as they are told now.
-            scene: that tells outlines.
+            scene: that tells outlines; one that has changed is news, too.
             believed: gives what is believed of an object until now: where it met something stays known.
             refuse: is told in a sentence of models that are none.
         """
         for model in models:
-            told = tuple(model.parameters), bytes(model.samples)
-            if self._last.get(model.object) == told:
-                continue
             try:
                 belief = belief_from_msg(model, scene)
             except (ModelError, NamoError, ControlError) as error:
                 refuse(f"model of {model.object!r} is left aside: {error}")
                 continue
-            if belief is None:
+            if belief is None or _same(belief, self._last.get(model.object)):
                 continue
-            self._last[model.object] = told
+            self._last[model.object] = belief
             before = believed(model.object)
             yield model.object, replace(belief, stops=before.stops) if isinstance(before, ObjectBelief) else belief
+
+
+def _same(belief: ObjectBelief, last: ObjectBelief | None) -> bool:
+    """Say whether a belief is of the same draws and the same outline as the last one."""
+    return (
+        last is not None
+        and np.array_equal(belief.rows, last.rows, equal_nan=True)
+        and np.array_equal(belief.footprint, last.footprint)
+    )
