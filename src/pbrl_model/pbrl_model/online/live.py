@@ -13,7 +13,7 @@ from pbrl_bag.types import Recording
 RESTART = 1.0
 """A stamp that is older than the topic's last by more than this [s] is of another clock: a bag played again."""
 BEFORE_GRASP = 2.5
-"""Of what lies before a grasp, this much is kept for as long as the grasp lasts [s]: weight and bias are read there."""
+"""Of what lies before a grasp, this much is kept with the grasp [s]: weight and bias are read there."""
 AFTER_GRASP = 0.5
 """Likewise of what lies after its beginning [s]."""
 
@@ -79,12 +79,12 @@ class LiveRecording:
         return max(self._last.values(), default=float("-inf"))
 
     def forget(self, before: float) -> None:
-        """Drop samples older than `before` [s], but for those around the beginning of the holds that still last.
+        """Drop samples older than `before` [s], but for those around the beginning of the holds that lasted until then.
 
         Args:
             before: what came earlier is used up.
         """
-        starts = self._open_since()
+        starts = self._starts(before)
         for topic in self._last:
             for role in roles_of(topic, CONTRACT):
                 if not isinstance(role.source, PoseSource | WrenchSource):
@@ -96,14 +96,17 @@ class LiveRecording:
                     if row[0] >= before or any(-BEFORE_GRASP <= row[0] - start <= AFTER_GRASP for start in starts)
                 ]
 
-    def _open_since(self) -> set[float]:
-        """Return when the grasps began that last message tells of [s]."""
+    def _starts(self, before: float) -> set[float]:
+        """Return when the grasps began that last, or ended after `before`: their end is not yet used up [s]."""
         since: dict[tuple[str, str], float] = {}
+        ended: set[float] = set()
         for message in self._grasps:
             held = {(grasp.gripper, grasp.object) for grasp in message.grasps}
             stamp = seconds(message.header.stamp)
+            if stamp > before:
+                ended |= {start for pair, start in since.items() if pair not in held}
             since = {pair: since.get(pair, stamp) for pair in held}
-        return set(since.values())
+        return ended | set(since.values())
 
     def _begin_again(self, stamp: float) -> None:
         """Drop everything but the scene, and a last word on grasps that is not older than the new clock."""
