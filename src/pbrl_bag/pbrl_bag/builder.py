@@ -118,13 +118,14 @@ class RecordingBuilder:
         """Return the samples of a role, to be added to; empty at first."""
         return self._samples.setdefault((kind, name), Samples(label, source))
 
-    def build(self, path: Path | str = "", *, complete: bool = True) -> Recording:
+    def build(self, path: Path | str = "", *, complete: bool = True, since: float = -np.inf) -> Recording:
         """Check what was collected and return it as a Recording.
 
         Args:
             path: where it came from, for errors and for `Recording.path`.
             complete: whether everything has to be there that is needed to learn from it. Otherwise what is missing
                 is told in `Recording.notes`, and one stream or one body is enough.
+            since: what was let go of before that need not be complete [s].
 
         Raises:
             BagError: a topic is missing, a stream is malformed; the message names topic, time and field.
@@ -148,7 +149,7 @@ class RecordingBuilder:
             notes.append(f"body {name!r} is seen but has no geometry: it cannot be learned about")
         recording = Recording(path, bodies, objects, grippers, wrenches, grasps, room, tuple(notes))
         if complete:
-            self._check_complete(recording)
+            self._check_complete(recording, since)
         return recording
 
     def _lags(self) -> dict[str, Array]:
@@ -293,9 +294,9 @@ class RecordingBuilder:
             raise self._missing(path, "grasps", "")
         return grasps_from_changes(topic, self._changes, end)
 
-    def _check_complete(self, recording: Recording) -> None:
-        """Raise a BagError where something that was grasped lacks what is needed to learn from it."""
-        for grasp in recording.grasps:
+    def _check_complete(self, recording: Recording, since: float) -> None:
+        """Raise a BagError where something that was held after `since` lacks what is needed to learn from it."""
+        for grasp in (each for each in recording.grasps if each.end > since):
             if grasp.object not in recording.bodies:
                 raise BagError(
                     f"{recording.path}: t = {grasp.start:.6f} s: gripper {grasp.gripper!r} holds {grasp.object!r}, "

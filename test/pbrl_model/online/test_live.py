@@ -87,6 +87,27 @@ def test_what_lies_round_a_grasp_is_not_forgotten_before_its_end_is() -> None:
     assert live.recording().wrenches["left"].time[0] == pytest.approx(107.0)
 
 
+def test_what_was_let_go_of_long_ago_and_is_out_of_sight_is_not_missed() -> None:
+    live = LiveRecording()
+    for topic, message in session(100.0):
+        live.add(topic, message)
+    live.add("/grasps", held(113.0, "chair"))
+    for topic, message in stream(110.0, 125.0):
+        live.add(topic.replace("table", "chair"), message)
+    live.forget(107.0)
+    with pytest.raises(BagError, match="which has no geometry"):
+        live.recording()  # the chair is held, and nobody said what it looks like
+    both = scene()
+    both.bodies.append(Body(name="chair", footprint=both.bodies[0].footprint, height=0.7, nominal_mass=5.0))
+    live.add("/scene", both)
+    assert set(live.recording().object_poses) == {"table", "chair"}
+    live.forget(115.0)
+    recording = live.recording()
+    assert set(recording.object_poses) == {"chair"}
+    # When the gripper was free is still known: its wrist is read between two holds.
+    assert [(grasp.object, grasp.start) for grasp in recording.grasps] == [("table", 103.0), ("chair", 113.0)]
+
+
 def test_time_that_goes_back_begins_anew() -> None:
     live = LiveRecording()
     for start in (100.0, 20.0):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from pbrl_bag.builder import RecordingBuilder
@@ -31,6 +32,7 @@ class LiveRecording:
         self.left_out = 0
         self._builder = RecordingBuilder()
         self._last: dict[str, float] = {}
+        self._forgotten = -math.inf
         self._scene: Any = None
         self._grasps: list[Any] = []
 
@@ -61,12 +63,12 @@ class LiveRecording:
         self._builder.add(topic, message)
 
     def recording(self) -> Recording:
-        """Return what is kept.
+        """Return what is kept; of a hold that was forgotten there may be nothing but the word on it.
 
         Raises:
             BagError: a topic is missing or a stream is malformed.
         """
-        return self._builder.build("what is heard")
+        return self._builder.build("what is heard", since=self._forgotten)
 
     @property
     def held(self) -> bool:
@@ -84,6 +86,7 @@ class LiveRecording:
         Args:
             before: what came earlier is used up.
         """
+        self._forgotten = before
         starts = self._starts(before)
         for topic in self._last:
             for role in roles_of(topic, CONTRACT):
@@ -111,7 +114,7 @@ class LiveRecording:
     def _begin_again(self, stamp: float) -> None:
         """Drop everything but the scene, and a last word on grasps that is not older than the new clock."""
         self.clocks += 1
-        self._builder, self._last = RecordingBuilder(), {}
+        self._builder, self._last, self._forgotten = RecordingBuilder(), {}, -math.inf
         if self._scene is not None:
             self._builder.add(SCENE_TOPIC, self._scene)
         grasps = [message for message in self._grasps[-1:] if seconds(message.header.stamp) <= stamp]
