@@ -14,8 +14,11 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 
+from pbrl_bag.episodes import cut_episodes
 from pbrl_bag.errors import BagError
+from pbrl_model.ros.heard import Heard, Message, recording_of
 from pbrl_model.ros.listener import RecordingListener
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -127,6 +130,30 @@ def test_it_keeps_its_name_where_its_process_is_told_what_the_other_node_is_call
     assert listener.get_fully_qualified_name() == "/ours/mismatch_listener"
     listener.stop()
     rclpy.try_shutdown(context=context)
+
+
+def test_where_the_oldest_holds_went_for_want_of_memory_the_last_ones_are_a_recording() -> None:
+    heard, warned = Heard(1_000_000), []
+    tags = ("/ar_tags/table/pose", "/ar_tags/left_gripper/pose")
+    kinds = {"/wrist_ft/left": WrenchStamped} | dict.fromkeys(tags, PoseStamped)
+
+    def say(topic: str, message: object) -> None:
+        warned.extend(heard.add(Message(topic, type(message), serialize_message(message))))
+
+    say("/scene", scene())
+    for second in range(0, 120, 2):  # held every other two seconds
+        say("/grasps", held(["table"] if second % 4 else [], second))
+        for time_ in np.arange(second, second + 2, 0.02).tolist():
+            for topic, kind in kinds.items():
+                message = stamped(kind(), time_, "left_ft" if kind is WrenchStamped else "world")
+                if kind is PoseStamped:
+                    message.pose.orientation.w = 1.0
+                say(topic, message)
+    assert len(warned) == 1 and "the oldest is forgotten" in warned[0]
+    recording = recording_of(heard.kept())
+    episodes = cut_episodes(recording)
+    assert 2 <= len(episodes) < 25 and episodes[-1].end == pytest.approx(119.98)
+    assert episodes[0].end > recording.object_poses["table"].time[0]
 
 
 def test_nothing_heard_is_an_error_that_says_so(context: Context) -> None:

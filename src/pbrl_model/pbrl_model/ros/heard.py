@@ -23,6 +23,8 @@ AFTER = 2.0
 """Kept of what comes after it [s]."""
 HOLDS = 8
 """Holds that a message is asked about: it is at most a few seconds old then."""
+SCRAP = 0.5
+"""So little that is left of a hold is none [s]: an episode has two poses at least."""
 HEADER_BYTES = 12
 """Of the encapsulation and the stamp: a message that is shorter is none."""
 RESTART = 1.0
@@ -174,10 +176,18 @@ class Heard:
             oldest = self._kept.popleft() if self._kept else self._recent.popleft()[1]
             self._size -= len(oldest.data)
             lost = True
+        if lost and (self._kept or self._recent):
+            self._drop_grasps((self._kept[0] if self._kept else self._recent[0][1]).stamp + SCRAP)
         if not lost or self._warned:
             return []
         self._warned = True
         return [f"more than {self._most / 1e6:g} MB were heard: the oldest is forgotten from now on (memory)"]
+
+    def _drop_grasps(self, before: float) -> None:
+        """Let go of what was said on grasps before, but for the last word: nothing is left of those holds."""
+        past = [one for one in self._rare if one.topic == GRASPS_TOPIC and one.stamp <= before][:-1]
+        if past:
+            self._rare = [one for one in self._rare if one not in past]
 
     def _needed(self, stamp: float) -> bool:
         """Tell whether a message lies within a hold, or just before or after one."""
