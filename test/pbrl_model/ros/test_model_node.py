@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 import rclpy
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped, WrenchStamped
+from nav_msgs.msg import Odometry
 from pbrl_msgs.msg import ObjectModels
 from pbrl_msgs.srv import LearnModel
 from rclpy.context import Context
@@ -26,6 +27,8 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
 
 from pbrl_bag.types import Recording
 from pbrl_model.arviz_bridge import save_posterior
@@ -224,6 +227,38 @@ def test_errors_are_the_answers_message_in_one_line(graph: Graph, monkeypatch: p
 
     monkeypatch.setattr(model_node, "fit_recording", breaks)
     assert graph.learn().message == "internal error: ZeroDivisionError: of ours"
+
+
+@pytest.mark.parametrize("kind", [PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped])
+def test_a_model_is_drawn_where_its_object_was_seen_whatever_tells_of_it(graph: Graph, kind: type) -> None:
+    graph.node._changed({"table": posterior("table")}, 1.0)
+    message, quarter = kind(), np.sqrt(0.5)
+    message.header.frame_id, message.header.stamp.sec = "world", 7
+    if kind is TransformStamped:
+        message.transform.translation.x, turn = 30.0, message.transform.rotation
+    else:
+        pose = message.pose if kind is PoseStamped else message.pose.pose
+        pose.position.x, turn = 30.0, pose.orientation
+    turn.z, turn.w = quarter, quarter
+    tag = graph.client.create_publisher(kind, "/ar_tags/table/pose", 10)
+    drawn: list[MarkerArray] = []
+    graph.client.create_subscription(MarkerArray, "/object_models/markers", drawn.append, 10)
+    graph.until(tag.get_subscription_count)
+    tag.publish(message)
+    graph.until(lambda: drawn)
+    points = drawn[-1].markers[0]
+    assert points.header.stamp.sec == 7
+    assert 29.0 < np.mean([point.x for point in points.points]) < 30.0  # a quarter turn: +y of the table is -x
+
+
+def test_what_is_no_pose_is_not_drawn(graph: Graph) -> None:
+    graph.node._changed({"table": posterior("table")}, 1.0)
+    tag = graph.client.create_publisher(TFMessage, "/ar_tags/table/pose", 10)
+    graph.until(tag.get_subscription_count)
+    tag.publish(TFMessage(transforms=[TransformStamped()]))
+    graph.until(lambda: graph.node.listener.last("/ar_tags/table/pose") is not None)
+    graph.node._draw()  # goes on
+    assert graph.learn().message
 
 
 def test_hears_while_it_fits(graph: Graph, monkeypatch: pytest.MonkeyPatch) -> None:

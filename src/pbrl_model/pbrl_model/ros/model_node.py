@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseStamped
 from pbrl_msgs.msg import ObjectModels
 from pbrl_msgs.srv import LearnModel
 from rclpy.clock import Clock, ClockType
@@ -21,6 +20,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from visualization_msgs.msg import MarkerArray
 
 from pbrl_bag import read_recording
+from pbrl_bag.decoding import PoseSample, poses_in
 from pbrl_bag.errors import BagError
 from pbrl_bag.ros.diagnostics import Diagnostics
 from pbrl_bag.ros.parameters import declare, refuse_unknown
@@ -231,9 +231,11 @@ class ModelNode(Node):
         """Publish markers where the objects were last seen."""
         drawn = MarkerArray()
         for posterior in self._posteriors.values():
-            seen: PoseStamped | None = self.listener.last(f"/ar_tags/{posterior.object}/pose")
-            if seen is not None:
-                drawn.markers += model_markers(posterior, _planar(seen), seen.header.stamp).markers
+            topic = f"/ar_tags/{posterior.object}/pose"
+            message = self.listener.last(topic)
+            with suppress(BagError, AttributeError):  # said where it is learned from
+                for seen in poses_in(topic, message, None) if message is not None else ():
+                    drawn.markers += model_markers(posterior, _planar(seen), message.header.stamp).markers
         if drawn.markers:
             self._markers.publish(drawn)
 
@@ -245,11 +247,10 @@ class ModelNode(Node):
         super().destroy_node()
 
 
-def _planar(seen: PoseStamped) -> np.ndarray:
+def _planar(seen: PoseSample) -> np.ndarray:
     """Return (3,) x, y, theta of a pose that stands upright."""
-    position, q = seen.pose.position, seen.pose.orientation
-    theta = np.arctan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
-    return np.array([position.x, position.y, theta])
+    x, y, z, w = seen.quaternion
+    return np.array([*seen.position[:2], np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))])
 
 
 def _end_of(recording: Recording) -> float:
