@@ -14,6 +14,7 @@ from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
 from pbrl_bag import BagError, Mapping, RecordingBuilder
+from pbrl_bag.mapping import FramePose
 
 
 def over_the_wire(message: Any) -> Any:
@@ -197,6 +198,23 @@ def test_an_offset_moves_the_pose_along_the_bodys_own_axes(kit: SimpleNamespace)
     expected = plain.position + 0.3 * np.column_stack([np.cos(yaw), np.sin(yaw), np.zeros(10)])
     np.testing.assert_allclose(moved.position, expected)
     np.testing.assert_allclose(moved.quaternion, plain.quaternion)
+
+
+@pytest.mark.parametrize("length", [0.0, 3.0])
+@pytest.mark.parametrize("more", [{"offset": {"position": [0.3, 0.0, 0.0]}}, {"frame": "mocap"}])
+def test_what_is_no_orientation_is_none_in_another_frame_either(
+    kit: SimpleNamespace, more: dict[str, Any], length: float
+) -> None:
+    mapping = mapping_for("PoseStamped", **more)
+    builder = RecordingBuilder(mapping.model_copy(update={"frames": {"mocap": FramePose(position=(1.0, 0.0, 0.0))}}))
+    for i in range(3):
+        message = kit.pose(0.1 * i, frame="mocap")
+        if i == 1:
+            message.pose.orientation.z, message.pose.orientation.w = 0.0, length
+        builder.add("/seen", message)
+        builder.add("/ft", kit.wrench(0.1 * i))
+    with pytest.raises(BagError, match=rf"/seen: t = 0.100000 s: orientation: expected a unit .* length {length:.3g}"):
+        builder.build("foreign")
 
 
 def test_an_orientation_that_means_nothing_can_be_left_out(kit: SimpleNamespace) -> None:

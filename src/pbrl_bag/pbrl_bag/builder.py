@@ -19,7 +19,7 @@ from pbrl_bag.joint_efforts import JointSamples, wrench_from_efforts
 from pbrl_bag.mapping import EffortSource, FramePose, Mapping, PoseSource, WrenchSource
 from pbrl_bag.roles import CONTRACT, Kind, Role, roles_of, topic_of
 from pbrl_bag.samples import Samples
-from pbrl_bag.streams import Limits, pose_stream, read_only, wrench_stream
+from pbrl_bag.streams import Limits, check_turns, pose_stream, read_only, wrench_stream
 from pbrl_bag.types import Array, BodyGeometry, Grasp, PoseStream, Recording, WrenchStream
 from pbrl_bag.validation import nearest
 
@@ -210,6 +210,7 @@ class RecordingBuilder:
         for (found, name), samples in sorted(self._samples.items()):
             if found == kind and len(samples) and isinstance(samples.source, PoseSource):
                 rows = samples.array(8)
+                check_turns(samples.label, rows[:, 0], rows[:, 4:8])
                 position, quaternion = self._to_world(rows[:, 1:4], rows[:, 4:8], samples)
                 streams[name] = pose_stream(samples.label, rows[:, 0], position, quaternion, limits, notes)
         return streams

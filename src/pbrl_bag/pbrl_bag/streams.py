@@ -55,19 +55,10 @@ def pose_stream(
     """
     time, position, quaternion = map(np.asarray, (time, position, quaternion))
     check_finite(source, time, position, ("position.x", "position.y", "position.z"))
-    unseen = np.isnan(quaternion).all(axis=1)
-    norm = np.linalg.norm(quaternion, axis=1)
-    wrong = ~unseen & ~(np.abs(norm - 1.0) <= QUATERNION_NORM_TOLERANCE)
-    if wrong.any():
-        i = int(np.argmax(wrong))
-        raise BagError(
-            f"{source}: t = {time[i]:.6f} s: orientation: expected a unit quaternion, got "
-            f"{np.array2string(quaternion[i], precision=4)} of length {norm[i]:.3g}; correct the publisher, or ignore "
-            "orientation in a mapping"
-        )
+    check_turns(source, time, quaternion)
     keep = _forward(source, time, np.hstack([position, quaternion]), notes)
     time, position = time[keep], position[keep]
-    quaternion = quaternion[keep] / np.where(unseen, 1.0, norm)[keep, None]
+    quaternion = quaternion[keep] / np.linalg.norm(quaternion[keep], axis=1, keepdims=True)
     _check_jumps(source, time, position, quaternion, limits)
     return PoseStream(read_only(time), read_only(position), read_only(quaternion))
 
@@ -95,6 +86,23 @@ def wrench_stream(
         check_finite(source, time, torque, ("torque.x", "torque.y", "torque.z"))
     keep = _forward(source, time, np.hstack([force, torque]), notes)
     return WrenchStream(read_only(time[keep]), read_only(force[keep]), read_only(torque[keep]), exerted_on, frame)
+
+
+def are_turns(quaternion: Array) -> np.ndarray:
+    """Tell which rows (n, 4) are unit quaternions, to a per cent: (n,) bool."""
+    return np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) <= QUATERNION_NORM_TOLERANCE
+
+
+def check_turns(source: str, time: Array, quaternion: Array) -> None:
+    """Raise a BagError at the first row (n, 4) that is neither a unit quaternion nor all NaN; times are (n,) [s]."""
+    wrong = ~np.isnan(quaternion).all(axis=1) & ~are_turns(quaternion)
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        raise BagError(
+            f"{source}: t = {time[i]:.6f} s: orientation: expected a unit quaternion, got "
+            f"{np.array2string(quaternion[i], precision=4)} of length {np.linalg.norm(quaternion[i]):.3g}; correct the "
+            "publisher, or ignore orientation in a mapping"
+        )
 
 
 def check_finite(source: str, time: Array, values: Array, fields: tuple[str, ...]) -> None:

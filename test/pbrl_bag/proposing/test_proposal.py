@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from geometry_msgs.msg import Quaternion
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -184,6 +185,28 @@ def test_efforts_give_way_to_a_wrench_and_lack_a_description(tmp_path: Path) -> 
 
 def test_frames_that_nothing_links_are_said(tmp_path: Path) -> None:
     messages = [each for each in recorded(LABS["other frames"]) if each[0] != "/tf_static"]
+    left = propose(bag_of(tmp_path / "bag", messages)).left
+    assert any("where 'robot' is in 'ceiling' is not in the bag" in each for each in left)
+
+
+@pytest.mark.parametrize("lab", ["other topics", "other frames"])
+def test_a_tracker_that_lost_the_thing_does_not_hide_who_held_it(lab: str, tmp_path: Path) -> None:
+    """It sends an orientation of no length then: of that nothing can be turned into another frame."""
+    messages = recorded(LABS[lab])
+    for topic, _, message, when in messages:
+        if topic in (LABS[lab].table, LABS[lab].hand) and 3.0 < when * 1e-9 < 3.3:
+            message.pose.orientation.z = message.pose.orientation.w = 0.0
+    mapping = propose(bag_of(tmp_path / "bag", messages)).mapping
+    assert mapping is not None and len(mapping.grasps) == 1
+    np.testing.assert_allclose(mapping.grasps[0].contact, CONTACT, atol=0.005)
+
+
+def test_a_fixed_frame_without_an_orientation_links_nothing(tmp_path: Path) -> None:
+    messages = recorded(LABS["other frames"])
+    for topic, _, message, _ in messages:
+        if topic == "/tf_static":
+            for transform in message.transforms:
+                transform.transform.rotation = Quaternion(x=0.0, y=0.0, z=0.0, w=0.0)
     left = propose(bag_of(tmp_path / "bag", messages)).left
     assert any("where 'robot' is in 'ceiling' is not in the bag" in each for each in left)
 

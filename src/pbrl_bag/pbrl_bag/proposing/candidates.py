@@ -14,6 +14,7 @@ from pbrl_bag.decoding import PoseSample, poses_in, seconds, wrench_in
 from pbrl_bag.errors import BagError
 from pbrl_bag.foreign_bag import ForeignBag
 from pbrl_bag.reader import Decoder, files_of, opened
+from pbrl_bag.streams import are_turns
 from pbrl_bag.types import Array
 
 POSES = ("PoseStamped", "PoseWithCovarianceStamped", "Odometry", "TransformStamped")
@@ -183,7 +184,9 @@ def _take(found: Candidates, topic: str, kind: str, message: Any, heard: float) 
         return
     for child, index, sample in _samples(topic, kind, message):
         if topic == STATIC and child is not None:
-            found.fixed[sample.frame, child] = (np.array(sample.position), np.array(sample.quaternion))
+            turn = np.array(sample.quaternion)
+            if are_turns(turn[None]).all():  # one that is none links nothing
+                found.fixed[sample.frame, child] = (np.array(sample.position), turn)
             continue
         key = (topic, child or ("" if index is None else str(index)), sample.frame)
         one = found.poses.setdefault(key, PoseCandidate(topic, kind, sample.frame, child, index))

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.spatial.transform import Rotation
 
+from pbrl_bag.streams import are_turns
 from pbrl_bag.types import Array
 
 MOVING = 0.01
@@ -63,7 +64,7 @@ def held(of: Array, by: Array) -> Held | None:
     """Tell whether, when and where an object was held.
 
     Args:
-        of: poses of the object (n, 8).
+        of: poses of the object (n, 8); those whose orientation is none are left out.
         by: poses of the gripper (m, 8), in the same frame.
 
     Returns:
@@ -72,7 +73,7 @@ def held(of: Array, by: Array) -> Held | None:
     if len(of) < FEWEST or len(by) < FEWEST:
         return None
     inside = (of[:, 0] >= by[0, 0]) & (of[:, 0] <= by[-1, 0])
-    rows = of[inside]
+    rows = of[inside & are_turns(of[:, 4:8])]
     if len(rows) < FEWEST or not np.isfinite(rows).all():
         return None
     hand = np.column_stack([np.interp(rows[:, 0], by[:, 0], by[:, k]) for k in (1, 2, 3)])

@@ -17,6 +17,7 @@ from pbrl_bag.proposing.efforts import Efforts, efforts_of
 from pbrl_bag.proposing.holding import Held, extent, held, while_felt
 from pbrl_bag.proposing.words import COMPENSATED, HANDS, NOT_A_NAME, ROBOT, side_of
 from pbrl_bag.roles import CONTRACT, roles_of
+from pbrl_bag.streams import are_turns
 from pbrl_bag.types import Array
 
 STILL = 0.02
@@ -294,5 +295,7 @@ def _in_world(each: PoseCandidate, places: dict[str, FramePose]) -> Array:
     place = places[each.frame]
     turn = Rotation.from_quat(place.quaternion)
     rows[:, 1:4] = turn.apply(rows[:, 1:4]) + np.array(place.position)
-    rows[:, 4:8] = (turn * Rotation.from_quat(rows[:, 4:8])).as_quat()
+    turned = are_turns(rows[:, 4:8])
+    if turned.any():
+        rows[turned, 4:8] = (turn * Rotation.from_quat(rows[turned, 4:8])).as_quat()
     return rows
