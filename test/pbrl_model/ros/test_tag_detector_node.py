@@ -18,6 +18,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
@@ -31,6 +32,11 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 HEIGHT, FOCAL, SIDE = 2.8, 500.0, 0.2
 DOWN = Transform(translation=Vector3(z=HEIGHT), rotation=Quaternion(x=1.0, w=0.0))
 K = [FOCAL, 0.0, 319.5, 0.0, FOCAL, 239.5, 0.0, 0.0, 1.0]
+
+
+def over_the_wire(message: CameraInfo) -> CameraInfo:
+    """What a subscriber gets."""
+    return deserialize_message(serialize_message(message), CameraInfo)
 
 
 def picture() -> np.ndarray:
@@ -146,3 +152,28 @@ def test_pictures_in_poses_out(context):
     # The plate is 2 mm thick, and what was drawn is a whole number of pixels.
     np.testing.assert_allclose(place_of_tag, [0.0, 0.0, HEIGHT - FOCAL * SIDE / size - 0.002], atol=0.006)
     assert abs(pose.orientation.w) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_camera_whose_pictures_are_of_another_size_takes_none_of_the_others(context):
+    names = Parameter("cameras", Parameter.Type.STRING, "overhead_0,overhead_1")
+    node = TagDetectorNode(context, parameter_overrides=[names])
+    outline = [Point(x=x, y=y) for x, y in ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))]
+    node._on_scene(Scene(bodies=[Body(name="desk", footprint=outline, movable=True)]))
+    place = TransformStamped(child_frame_id="overhead", transform=DOWN)
+    place.header.frame_id = "world"
+    node._on_frames(TFMessage(transforms=[place]))
+    lens = CameraInfo(width=640, height=480, k=K, d=[0.0] * 5, distortion_model="plumb_bob")
+    lens.header.frame_id = "overhead"
+    shot, half = image_message(picture(), "mono8"), image_message(picture()[::2, ::2].copy(), "mono8")
+    for name in ("overhead_0", "overhead_1"):
+        node._on_info(name, over_the_wire(lens))
+    for tick in range(1, 5):
+        shot.header.stamp.sec = half.header.stamp.sec = tick
+        node._on_image("overhead_1", half)
+        node._on_image("overhead_0", shot)
+    assert node._found == 1
+    # The camera says so by now, and its next picture is read.
+    lens.height, lens.width = half.height, half.width
+    node._on_info("overhead_1", over_the_wire(lens))
+    assert node._camera("overhead_1").height == 240
+    node.destroy_node()

@@ -92,7 +92,7 @@ class TagDetectorNode(Node):
 
     def _on_info(self, name: str, message: CameraInfo) -> None:
         old = self._info.get(name)
-        if old is None or old.header.frame_id != message.header.frame_id or (old.k != message.k).any():
+        if old is None or _of_another_camera(old, message):
             self._cameras.pop(name, None)
         self._info[name] = message
 
@@ -132,6 +132,12 @@ class TagDetectorNode(Node):
             x, y, z, w = reading.quaternion.tolist()
             message.pose.orientation = Quaternion(x=x, y=y, z=z, w=w)
             self._outputs[reading.name].publish(message)
+
+
+def _of_another_camera(one: CameraInfo, other: CameraInfo) -> bool:
+    """Tell whether a camera was exchanged, or takes pictures of another size now."""
+    first, second = ((info.header.frame_id, info.height, info.width, info.k.tolist()) for info in (one, other))
+    return first != second
 
 
 def _stamp(time: float) -> Time:

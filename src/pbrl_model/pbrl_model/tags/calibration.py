@@ -42,6 +42,14 @@ class CameraCalibration:
     position: Array
     rotation: Array
 
+    def check(self, image: NDArray[np.uint8]) -> None:
+        """Raise a ModelError where an image is no picture of this camera: (height, width) grey levels."""
+        if image.shape != (self.height, self.width) or image.dtype != np.uint8:
+            raise ModelError(
+                f"camera {self.name}: expected {self.height} x {self.width} grey levels uint8, "
+                f"got {image.shape} {image.dtype}"
+            )
+
     def rays(self, pixels: Array) -> Array:
         """Return where pixels look: x, y (n, 2) at distance 1 along the axis, without the lens's distortion.
 

@@ -80,11 +80,7 @@ class TagFinder:
         Raises:
             ModelError: the picture is not one of this camera.
         """
-        if image.shape != (camera.height, camera.width) or image.dtype != np.uint8:
-            raise ModelError(
-                f"camera {camera.name}: expected {camera.height} x {camera.width} grey levels uint8, "
-                f"got {image.shape} {image.dtype}"
-            )
+        camera.check(image)
         found, ids, _ = self._detector.detectMarkers(image)
         seen = []
         for corners, number in sorted(

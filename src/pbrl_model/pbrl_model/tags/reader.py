@@ -28,10 +28,17 @@ MOST_UNSURE = 0.03
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture of one camera: (height, width) grey levels."""
+    """One picture of one camera: (height, width) grey levels.
+
+    Raises:
+        ModelError: it is not one of this camera.
+    """
 
     camera: CameraCalibration
     image: Image
+
+    def __post_init__(self) -> None:
+        self.camera.check(self.image)
 
 
 @dataclass(frozen=True)
