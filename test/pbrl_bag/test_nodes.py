@@ -17,7 +17,9 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String, UInt8MultiArray
 
 from pbrl_bag import describe, read_recording
@@ -25,6 +27,7 @@ from pbrl_bag.mcap_file import McapFile
 from pbrl_bag.metadata import read_metadata
 from pbrl_bag.ros.conversions import message_class
 from pbrl_bag.ros.crash_harness import crash_recorder, executable
+from pbrl_bag.ros.player_node import PlayerNode
 
 PATIENCE = 60.0  # [s] for things that take a fraction of a second on an idle machine
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -265,3 +268,15 @@ def test_what_is_played_and_recorded_again_reads_the_same(
     assert repr(again.grasps) == repr(first.grasps)
     assert repr(again.wrenches) == repr(first.wrenches)
     assert repr(again.object_poses) == repr(first.object_poses)
+
+
+@pytest.mark.parametrize("clock", ["/clock", "/ours/clock"])
+def test_a_clock_that_was_recorded_is_the_only_one_that_is_played(
+    graph: Graph, tmp_path: Path, kit: SimpleNamespace, clock: str
+) -> None:
+    messages = [("/ours" + topic, *rest) for topic, *rest in kit.pushing()]
+    bag = kit.write(tmp_path / "of", [*messages, (clock, "rosgraph_msgs/msg/Clock", Clock(), 0)])
+    override = [Parameter("bag", Parameter.Type.STRING, str(bag))]
+    player = PlayerNode(context=graph.context, namespace="/again", parameter_overrides=override)
+    assert [out.topic_name for out in player.publishers if "clock" in out.topic_name] == ["/clock"]
+    player.destroy_node()

@@ -52,7 +52,8 @@ class PlayerNode(Node):
         for topic in self.awaited:
             if topic not in self._publishers_by_topic:
                 raise BagError(f"wait_for: expected a topic of the bag, got {topic!r}")
-        has_clock = in_namespace(CLOCK_TOPIC, self._recorded_in) in self.bag.topics
+        # A robot in a namespace has a clock of its own, or goes by the one of all.
+        has_clock = not {CLOCK_TOPIC, in_namespace(CLOCK_TOPIC, self._recorded_in)}.isdisjoint(self.bag.topics)
         self._clock_publisher = None if has_clock else self.create_publisher(Clock, CLOCK_TOPIC, 10)
         for note in self.bag.notes:
             self.get_logger().warning(note)
