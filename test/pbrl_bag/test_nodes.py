@@ -14,6 +14,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import rclpy
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -165,6 +167,29 @@ def test_a_publisher_that_offers_less_is_heard_all_the_same(graph: Graph, tmp_pa
     recorder.send_signal(signal.SIGINT)
     recorder.communicate(timeout=PATIENCE)
     assert describe(tmp_path / "bag").finished
+
+
+def test_what_comes_before_the_first_word_of_the_clock_is_not_of_the_year_1970(graph: Graph, tmp_path: Path) -> None:
+    latched = graph.node.create_publisher(String, "/said", LATCHED)
+    latched.publish(String(data="before the simulator ran"))
+    time_source = graph.node.create_publisher(Clock, "/clock", 10)
+    recorder = graph.start("recorder_node", output=tmp_path / "bag", topics="['/said']", use_sim_time=True)
+    told: list[str] = []
+    graph.node.create_subscription(
+        DiagnosticArray, "/diagnostics", lambda heard: told.extend(one.message for one in heard.status), 10
+    )
+    graph.until(lambda: latched.get_subscription_count() > 0 and any("waits for /clock" in word for word in told))
+    recorded = tmp_path / "bag" / "bag_0.mcap"
+    assert describe(recorded).message_count == 0
+
+    def is_written() -> bool:
+        time_source.publish(Clock(clock=Time(sec=5)))
+        return describe(recorded).message_count > 0
+
+    graph.until(is_written)
+    recorder.send_signal(signal.SIGINT)
+    recorder.communicate(timeout=PATIENCE)
+    assert [message.log_time for message in McapFile(recorded).messages()] == [5_000_000_000]
 
 
 @pytest.mark.parametrize("run_seconds", [0.6, 0.9, 1.3])

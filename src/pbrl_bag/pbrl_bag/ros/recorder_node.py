@@ -73,7 +73,8 @@ class RecorderNode(Node):
     In a namespace that is what lies in it, and clock and transforms as they are remapped for it. Names stay as they
     are on the wire; patterns are of names as in the root namespace.
 
-    Log time is the time of arrival: wall time, or the time of `/clock` under use_sim_time.
+    Log time is the time of arrival: wall time, or the time of `/clock` under use_sim_time. What comes before the first
+    word of that clock waits in the middleware: it has no time yet.
 
     Raises:
         BagError: the output folder exists or cannot be made.
@@ -100,7 +101,13 @@ class RecorderNode(Node):
         self.get_logger().info(f"recording into {self.output}")
 
     def _doing(self) -> str:
+        if self._timeless():
+            return "waits for /clock (use_sim_time)"
         return f"records into {self.output}" if self._heard else "waits for a topic that somebody publishes"
+
+    def _timeless(self) -> bool:
+        """Tell whether it goes by a clock that has not been heard yet."""
+        return self._sim_time and self.get_clock().now().nanoseconds == 0
 
     def _numbers(self) -> dict[str, object]:
         return {"topics": len(self._heard), "left out": len(self._refused), "messages": self.writer.message_count}
@@ -172,11 +179,13 @@ class RecorderNode(Node):
             executor.shutdown()
 
     def drain(self) -> None:
-        """Write what has arrived and waits in the middleware, in the order in which it was sent.
+        """Write what has arrived and waits in the middleware, in the order in which it was sent, once there is a time.
 
         Raises:
             BagError: it cannot be written.
         """
+        if self._timeless():
+            return
         arrived: list[tuple[int, str, bytes]] = []
         for topic, heard in self._heard.items():
             waiting = heard.subscription.handle
