@@ -13,8 +13,10 @@ from pbrl_bag.types import PoseStream, Recording
 from pbrl_bringup.experiments.contact import Trial, rows_of
 from pbrl_bringup.experiments.contact_cases import HELD, PUSHED, Case, random_case, rotation, until
 from pbrl_bringup.experiments.contact_figure import draw
+from pbrl_model.contact import fit as contact_fit
 from pbrl_model.contact.fit import ContactFit, ContactOptions, fit_contact
 from pbrl_model.errors import ModelError
+from pbrl_model.fitting import sampling
 
 Array = NDArray[np.float64]
 
@@ -85,6 +87,17 @@ def test_moving_the_scene_changes_nothing(case: Case, fit: ContactFit) -> None:
     elsewhere = fit_contact(_moved(case.recordings[0], np.pi / 2.0, np.array([4.0, -3.0])), PUSHED, QUICK)
     assert np.hypot(*(elsewhere.wheel - fit.wheel)) < 0.3 * fit.radius
     assert elsewhere.held.parameters.mass == pytest.approx(fit.held.parameters.mass, rel=0.02)
+
+
+def test_where_weights_collapse_the_draws_are_those_of_chains_as_the_note_says(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sampling, "ENOUGH", 1e9)
+    monkeypatch.setattr(sampling, "ATTEMPTS", 1)
+    monkeypatch.setattr(contact_fit, "CHAINS", {"count": 4, "burn_in": 50, "thin": 1})
+    found = fit_contact(case.recordings[0], PUSHED, replace(QUICK, search_draws=30))
+    assert any("the draws are those of Metropolis chains" in note for note in found.notes)
+    assert found.posterior.draws.shape[:2] == (4, 125) and np.isnan(found.posterior.log_evidence)
 
 
 def test_same_seed_same_bytes(case: Case, fit: ContactFit) -> None:

@@ -12,7 +12,7 @@ from pbrl_model.fitting.calibration import TABLE, empty_windows, options_for, wi
 from pbrl_model.fitting.fit import target_of
 from pbrl_model.fitting.likelihood import WindowedLikelihood
 from pbrl_model.fitting.polish import Modes
-from pbrl_model.fitting.sampling import chains, weighted
+from pbrl_model.fitting.sampling import chains, sampled, weighted
 from pbrl_model.fitting.starts import SearchPlan, find_modes
 from pbrl_model.fitting.target import Target
 from pbrl_model.geometry import mass_properties
@@ -89,4 +89,6 @@ def test_an_evidence_that_does_not_converge_is_not_given(monkeypatch: pytest.Mon
     found = weighted(np.random.default_rng(6), *FREE, draws=500)
     assert np.isnan(found.log_evidence) and np.isnan(found.log_evidence_sd)
     (note,) = found.notes
-    assert "did not converge" in note
+    assert "did not converge" in note and "chains" not in note
+    stand_in = sampled(np.random.default_rng(6), *FREE, draws=10, count=4, burn_in=20, thin=1)
+    assert stand_in.position.shape[:2] == (4, 3) and stand_in.notes[0].endswith("those of Metropolis chains")

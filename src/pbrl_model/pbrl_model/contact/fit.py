@@ -27,7 +27,7 @@ from pbrl_model.contact.wrench import HeldBody
 from pbrl_model.engines.contact_world import contact_scene
 from pbrl_model.errors import ModelError
 from pbrl_model.fitting.likelihood import WindowedLikelihood
-from pbrl_model.fitting.sampling import Sampled, weighted
+from pbrl_model.fitting.sampling import Sampled, sampled
 from pbrl_model.fitting.starts import SearchPlan, find_modes
 from pbrl_model.fitting.target import Target
 from pbrl_model.parameters import ANGLES, BodyParameters
@@ -57,6 +57,8 @@ LEAST_PUSH, LEAST_TURN = 0.03, math.radians(5.0)
 LEAST_DELAY, DELAY_ROUNDS = 0.01, 3
 """A delay between poses and wrenches that is worth another look [s], and how many looks are taken."""
 KDE_DRAWS = 1000
+CHAINS = {"count": 4, "burn_in": 1000, "thin": 8}
+"""Metropolis chains where importance weights collapse, as `fit` has them."""
 SEARCH_WINDOWS, SEARCH_KEEP, SEARCH_ITERATIONS = (0.5, 1.0), (16, 6, 4), (6, 8, 15)
 """Lengths of the search's windows before the last [s]; modes kept and iterations of each stage."""
 
@@ -249,15 +251,15 @@ def _learn_pushed(
     lengths = tuple(length for length in SEARCH_WINDOWS if length < options.window)
     stages = len(lengths) + 1
     plan = SearchPlan(options.search_draws, SEARCH_KEEP[-stages:], lengths, SEARCH_ITERATIONS[-stages:])
-    sampled = weighted(rng, target, find_modes(rng, target, motions, plan), draws=options.draws)
-    posterior = _posterior(found.pushed, target, sampled)
-    noise = np.exp(sampled.position[..., target.simulated :])
-    notes = notes_on(posterior, prior, motions, rng) + sampled.notes + note_on_left_out(noise, options.left_out_force)
+    draws = sampled(rng, target, find_modes(rng, target, motions, plan), draws=options.draws, **CHAINS)
+    posterior = _posterior(found.pushed, target, draws)
+    noise = np.exp(draws.position[..., target.simulated :])
+    notes = notes_on(posterior, prior, motions, rng) + draws.notes + note_on_left_out(noise, options.left_out_force)
     return posterior, notes + _doubts(posterior, motions)
 
 
-def _posterior(name: str, target: Target, sampled: Sampled) -> Posterior:
-    draws = sampled.position[..., : len(target.names)].copy()
+def _posterior(name: str, target: Target, found: Sampled) -> Posterior:
+    draws = found.position[..., : len(target.names)].copy()
     for angle in ANGLES & set(target.names):
         column = target.names.index(angle)
         draws[..., column] = wrap(draws[..., column], 2.0 * math.pi)
@@ -267,9 +269,9 @@ def _posterior(name: str, target: Target, sampled: Sampled) -> Posterior:
         target.names,
         draws,
         target.base,
-        log_evidence=sampled.log_evidence,
-        log_evidence_sd=sampled.log_evidence_sd,
-        ess=sampled.ess,
+        log_evidence=found.log_evidence,
+        log_evidence_sd=found.log_evidence_sd,
+        ess=found.ess,
     )
 
 

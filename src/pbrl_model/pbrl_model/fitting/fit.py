@@ -21,7 +21,7 @@ from pbrl_model.fitting.heldout import Heldout, Split, heldout_error, split
 from pbrl_model.fitting.likelihood import WindowedLikelihood
 from pbrl_model.fitting.options import FitOptions
 from pbrl_model.fitting.polish import Modes
-from pbrl_model.fitting.sampling import Sampled, chains, weighted
+from pbrl_model.fitting.sampling import Sampled, chains, sampled
 from pbrl_model.fitting.starts import SearchPlan, climb_again, find_modes
 from pbrl_model.fitting.target import LEFT_OUT_BESIDE_GROUND, LEFT_OUT_FORCE, Target
 from pbrl_model.geometry import MassProperties
@@ -200,15 +200,11 @@ def _fit_object(rng: np.random.Generator, recording: Recording, name: str, optio
 
 
 def _sampled(rng: np.random.Generator, target: Target, modes: Modes, options: FitOptions) -> Sampled:
-    """Draw from the posterior; chains stand in where weights collapse on so few draws that they show no spread."""
-    notes: tuple[str, ...] = ()
+    """Draw from the posterior."""
+    steps = {"count": options.chains, "burn_in": options.burn_in, "thin": options.thin}
     if options.sampler == "importance":
-        found = weighted(rng, target, modes, draws=options.chains * options.draws)
-        if found.converged:
-            return found
-        notes = found.notes
-    count = {"count": options.chains, "burn_in": options.burn_in, "draws": options.draws, "thin": options.thin}
-    return replace(chains(rng, target, modes, **count), notes=notes)
+        return sampled(rng, target, modes, draws=options.chains * options.draws, **steps)
+    return chains(rng, target, modes, draws=options.draws, **steps)
 
 
 @dataclass(frozen=True)

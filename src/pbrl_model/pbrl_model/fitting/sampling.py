@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,10 +148,31 @@ def weighted(rng: np.random.Generator, target: Target, modes: Modes, *, draws: i
     if not _trusted(found):
         notes = (
             f"the evidence did not converge ({found.ess:.0f} effective samples, Pareto k {found.pareto_k:.2f}): "
-            "it is not given, and the draws are those of Metropolis chains",
+            "it is not given",
         )
         evidence = error = math.nan
     return Sampled(position[None], evidence, error, found.ess, found.pareto_k, np.full((1, 2), np.nan), notes)
+
+
+def sampled(
+    rng: np.random.Generator, target: Target, modes: Modes, *, draws: int, count: int, burn_in: int, thin: int
+) -> Sampled:
+    """Sample by importance; chains stand in where weights collapse on so few draws that they show no spread.
+
+    Args:
+        rng: source of randomness.
+        target: log density.
+        modes: of it.
+        draws: of equal weight to return; chains return so many together, or a few more.
+        count: of the chains.
+        burn_in: steps of each in which it adapts.
+        thin: steps for each draw kept.
+    """
+    found = weighted(rng, target, modes, draws=draws)
+    if found.converged:
+        return found
+    run = chains(rng, target, modes, count=count, burn_in=burn_in, draws=math.ceil(draws / count), thin=thin)
+    return replace(run, notes=tuple(f"{note}, and the draws are those of Metropolis chains" for note in found.notes))
 
 
 def _trusted(found: Weighted) -> bool:
