@@ -91,6 +91,7 @@ BAD = {
     "key": ({"weel": {}}, "unknown key weel; did you mean 'wheel'"),
     "inner key": ({"mass": {"sigmas": 1}}, "unknown key mass.sigmas; did you mean 'sigma'"),
     "parameter": ({"parameters": {"mas": {"distribution": "uniform", "lower": 0, "upper": 1}}}, "did you mean 'mass'"),
+    "no prior": ({"parameters": {"anchor_x": {"distribution": "uniform", "lower": 0, "upper": 1}}}, "got 'anchor_x'"),
     "distribution": ({"parameters": {"mass": {"distribution": "normal"}}}, "parameters.mass"),
     "spec key": (
         {"parameters": {"mass": {"distribution": "uniform", "lower": 0, "upper": 1, "uper": 2}}},

@@ -10,10 +10,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pbrl_bag.yaml_text import parse_yaml
 from pbrl_model.distributions import Distribution, LogNormal, TruncatedNormal, Uniform, VonMises
 from pbrl_model.errors import ModelError
-from pbrl_model.parameters import KERNEL_COLUMNS, nearest
+from pbrl_model.parameters import MODEL_CLASSES, nearest
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+LEARNED = tuple(dict.fromkeys(name for names in MODEL_CLASSES.values() for name in names))
+"""Parameters that have a prior: those that some model class learns."""
 
 
 class _Strict(BaseModel):
@@ -23,7 +26,7 @@ class _Strict(BaseModel):
 class MassOptions(_Strict):
     """Log-normal prior of the mass: around the nominal mass where there is one, wide where there is none."""
 
-    sigma: Positive = 0.5
+    sigma: Positive = 0.5  # for a body on a hinge this is 1.5, unless another is told
     unknown_median: Positive = 15.0  # [kg]
     unknown_sigma: Positive = 1.0
 
@@ -146,9 +149,10 @@ def parse_prior_options(values: object, where: str = "priors") -> PriorOptions:
     except ValidationError as error:
         raise ModelError(f"{where}: {_one_line(error)}") from None
     for name, spec in options.parameters.items():
-        if name not in KERNEL_COLUMNS:
-            hint = nearest(name, KERNEL_COLUMNS)
-            raise ModelError(f"{where}: parameters: expected one of {', '.join(KERNEL_COLUMNS)}, got {name!r}{hint}")
+        if name not in LEARNED:
+            raise ModelError(
+                f"{where}: parameters: expected one of {', '.join(LEARNED)}, got {name!r}{nearest(name, LEARNED)}"
+            )
         spec.build()
     return options
 

@@ -12,11 +12,16 @@ import numpy as np
 import pytest
 
 from pbrl_bag.types import BodyGeometry, Grasp, PoseStream, Recording, WrenchStream
+from pbrl_model.distributions import LogNormal
 from pbrl_model.errors import ModelError
+from pbrl_model.fitting.calibration import TABLE, empty_windows
 from pbrl_model.fitting.episodes import motions_of
-from pbrl_model.fitting.fit import FitOptions, fit_recording
+from pbrl_model.fitting.fit import FitOptions, fit_recording, target_of
+from pbrl_model.fitting.likelihood import WindowedLikelihood
+from pbrl_model.geometry import mass_properties
 from pbrl_model.parameters import BodyParameters, free_columns
 from pbrl_model.predict import path_error, predict, predict_windows, unlearned
+from pbrl_model.prior_options import MassOptions, PriorOptions
 from pbrl_model.sensing.windows import whole_windows
 from pbrl_model.verdicts import note_on_left_out
 
@@ -191,6 +196,16 @@ def door(radius: float = 0.3, seed: int = 0) -> Recording:
         },
         grasps=(Grasp("right", "door", float(time[0]), float(time[-1]), np.zeros(2)),),
     )
+
+
+@pytest.mark.parametrize(
+    ("told", "taken"), [({}, 1.5), ({"sigma": 0.5}, 1.5), ({"sigma": 0.2}, 0.2), ({"sigma": 2}, 2)]
+)
+def test_how_well_a_doors_mass_is_known_can_be_told(told: dict[str, float], taken: float) -> None:
+    """What it weighs at its handle is else taken for less sure than what it weighs; the usual file tells the usual."""
+    options = FitOptions(model_class="hinge", priors=PriorOptions(mass=MassOptions(**told)))
+    likelihood = WindowedLikelihood(mass_properties(TABLE.footprint), empty_windows(np.random.default_rng(0), "hinge"))
+    assert target_of(TABLE, likelihood, options).prior.parts["mass"] == LogNormal(TABLE.nominal_mass, taken)
 
 
 def test_hinge_of_a_door() -> None:

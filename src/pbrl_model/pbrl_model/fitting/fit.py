@@ -28,7 +28,7 @@ from pbrl_model.geometry import MassProperties
 from pbrl_model.parameters import ANGLES, BodyParameters, free_columns
 from pbrl_model.posterior import Posterior
 from pbrl_model.predict import UNKNOWN_MASS
-from pbrl_model.prior_options import PriorOptions
+from pbrl_model.prior_options import MassOptions, PriorOptions
 from pbrl_model.priors import Prior, table2_prior
 from pbrl_model.sensing.motion import Motion
 from pbrl_model.sensing.wrench_error import wrench_error
@@ -54,7 +54,7 @@ LEAST_DELAY = 0.01
 """Wrenches are not shifted for less [s], nor for less than the delay's standard deviation; it stays an unknown."""
 DELAY_ROUNDS = 3
 DOOR_MASS_SPREAD = 1.5
-"""Least spread of ln mass for a body on a hinge."""
+"""Spread of ln mass for a body on a hinge where none is told."""
 
 
 @dataclass(frozen=True)
@@ -168,9 +168,12 @@ def target_of(
 
 
 def _priors(options: FitOptions) -> PriorOptions:
-    """Return the priors; what a door weighs at its handle is not known from what it weighs on scales."""
+    """Return the priors; what a door weighs at its handle is not known from what it weighs on scales.
+
+    A spread other than the usual one was meant for the door. That of a file or a state may be the usual one, told.
+    """
     mass = options.priors.mass
-    if options.model_class != "hinge" or mass.sigma >= DOOR_MASS_SPREAD:
+    if options.model_class != "hinge" or mass.sigma != MassOptions().sigma:
         return options.priors
     return options.priors.model_copy(update={"mass": mass.model_copy(update={"sigma": DOOR_MASS_SPREAD})})
 
