@@ -79,6 +79,23 @@ def test_units_signs_and_frames_end_up_in_si_and_world(tmp_path: Path) -> None:
     assert [(grasp.start, grasp.end) for grasp in recording.grasps] == [(0.1, 0.3)]
 
 
+def test_what_is_to_be_ignored_is_not_read(tmp_path: Path) -> None:
+    mapping = SMALL.replace("yaw: a,", "yaw: a, ignore_orientation: true,")
+    mapping = mapping.replace("torque: [0.0, 0.0, tz],", "torque: [0.0, 0.0, tz], ignore_torque: true,")
+    mapping = mapping.replace("nominal_mass: 3.0", "nominal_mass: 3.0, pose: [0, 0, 0]")
+    recording = read(tmp_path, ["t,x,y,no_angle,fx,no_torque", *ROWS[1:]], mapping)
+    assert np.isnan(recording.object_poses["box"].quaternion).all()
+    assert np.isnan(recording.wrenches["left"].torque).all()
+
+
+def test_half_of_a_recording_can_be_looked_at(tmp_path: Path) -> None:
+    """What is asked to be read as far as it goes may hold a gripper that felt nothing."""
+    mapping = SMALL[: SMALL.index("wrenches:")] + SMALL[SMALL.index("grasps:") :]
+    assert "wrenches.left" in refusal(tmp_path, ROWS, mapping)
+    recording = read_recording(tmp_path / "data.csv", tmp_path / "map.yaml", complete=False)
+    assert set(recording.object_poses) == {"box"} and "there is no wrench in it" in recording.notes
+
+
 def test_streams_cannot_be_written_to(tmp_path: Path) -> None:
     box = read(tmp_path, ROWS).object_poses["box"]
     with pytest.raises(ValueError, match="read-only"):

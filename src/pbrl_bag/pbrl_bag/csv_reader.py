@@ -85,12 +85,13 @@ class Table:
         )
 
 
-def read_csv(path: Path, mapping: Mapping) -> Recording:
+def read_csv(path: Path, mapping: Mapping, *, complete: bool = True) -> Recording:
     """Read a CSV file through a mapping.
 
     Args:
         path: the file.
         mapping: names its columns.
+        complete: see `RecordingBuilder.build`.
 
     Raises:
         BagError: the mapping does not fit the file, or the file is malformed.
@@ -108,7 +109,7 @@ def read_csv(path: Path, mapping: Mapping) -> Recording:
         _add_pose(builder, table, time, "gripper_poses", side, pose)
     for side, wrench in mapping.wrenches.items():
         _add_wrench(builder, table, time, side, wrench)
-    return builder.build(path)
+    return builder.build(path, complete=complete)
 
 
 def _time(table: Table, source: TimeColumn) -> Array:
@@ -137,10 +138,11 @@ def _add_pose(builder: RecordingBuilder, table: Table, time: Array, kind: str, n
         )
     position = table.columns(source.position)
     quaternion = np.full((len(time), 4), np.nan)
-    if source.orientation is not None:
-        quaternion = table.columns(source.orientation)
-    elif source.yaw is not None:
-        angle = table.columns((source.yaw,))[:, 0]
+    orientation, yaw = (None, None) if source.ignore_orientation else (source.orientation, source.yaw)
+    if orientation is not None:
+        quaternion = table.columns(orientation)
+    elif yaw is not None:
+        angle = table.columns((yaw,))[:, 0]
         angle = np.deg2rad(angle) if source.angle_unit == "deg" else angle
         zero = np.zeros_like(angle)
         quaternion = np.column_stack([zero, zero, np.sin(angle / 2.0), np.cos(angle / 2.0)])
@@ -157,7 +159,8 @@ def _add_wrench(builder: RecordingBuilder, table: Table, time: Array, side: str,
             f"{table.path}: wrenches.{side}: names topic {source.topic!r}, but this is a CSV file; give `force`"
         )
     force = table.columns(source.force)
-    torque = np.full_like(force, np.nan) if source.torque is None else table.columns(source.torque)
+    felt = None if source.ignore_torque else source.torque
+    torque = np.full_like(force, np.nan) if felt is None else table.columns(felt)
     rows = np.column_stack([time, force, torque])
     samples = builder.samples("wrenches", side, f"{table.path}: wrenches.{side}", source)
     samples.extend(rows)

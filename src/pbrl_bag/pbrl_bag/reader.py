@@ -55,7 +55,7 @@ def read_recording(
         return _read_bag(path, files, rules, complete, also or {})
     if rules is None:
         raise BagError(f"{path}: a CSV file needs a mapping that names its columns; see config/mappings/")
-    return read_csv(path, rules)
+    return read_csv(path, rules, complete=complete)
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
