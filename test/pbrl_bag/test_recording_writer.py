@@ -72,10 +72,21 @@ def test_wrenches_that_are_not_raw_are_refused(recording: Recording, tmp_path: P
     assert not (tmp_path / "bag").exists()
 
 
+def test_an_error_that_stays_is_refused_and_not_left_out(recording: Recording, tmp_path: Path) -> None:
+    felt = {side: replace(stream, covariance=np.eye(6)) for side, stream in recording.wrenches.items()}
+    with pytest.raises(BagError, match="left: expected the wrench of a sensor, got one with the covariance"):
+        write_recording(replace(recording, wrenches=felt), tmp_path / "bag")
+    assert not (tmp_path / "bag").exists()
+
+
 def test_missing_numbers_and_missing_streams_are_refused(recording: Recording, tmp_path: Path) -> None:
     felt = recording.wrenches["left"]
     blind = WrenchStream(felt.time, felt.force, np.full_like(felt.torque, np.nan))
     with pytest.raises(BagError, match="finite numbers"):
         write_recording(replace(recording, wrenches={"left": blind}), tmp_path / "bag")
+    hand = recording.gripper_poses["left"]
+    lost = replace(hand, quaternion=np.full_like(hand.quaternion, np.nan))
+    with pytest.raises(BagError, match="left: expected finite numbers"):
+        write_recording(replace(recording, gripper_poses={"left": lost}), tmp_path / "bag")
     with pytest.raises(BagError, match="at least one stream"):
         write_recording(replace(recording, wrenches={}, object_poses={}, gripper_poses={}), tmp_path / "bag")

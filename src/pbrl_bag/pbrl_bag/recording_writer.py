@@ -38,7 +38,7 @@ def write_recording(recording: Recording, folder: Path | str) -> Path:
         The folder.
 
     Raises:
-        BagError: the folder exists, a wrench is not raw in sensor axes, or a number is missing.
+        BagError: the folder exists, a wrench is not raw in sensor axes or not a sensor's, or a number is missing.
     """
     _check(recording)
     messages = sorted(_messages(recording), key=lambda one: one[0])
@@ -57,11 +57,17 @@ def _check(recording: Recording) -> None:
                 f"{where}: {side}: expected a raw wrench in the sensor's axes, got one exerted on the "
                 f"{felt.exerted_on} in {felt.frame} axes; a bag of the contract cannot hold it"
             )
-    streams: dict[str, list[Array]] = {}
+        if felt.covariance is not None:
+            raise BagError(
+                f"{where}: {side}: expected the wrench of a sensor, got one with the covariance of an error that "
+                "stays; a bag of the contract cannot hold it"
+            )
+    streams: list[tuple[str, list[Array]]] = []
     for name, pose in (*recording.object_poses.items(), *recording.gripper_poses.items()):
-        streams[name] = [pose.time, pose.position, pose.quaternion]
-    streams |= {side: [felt.time, felt.force, felt.torque] for side, felt in recording.wrenches.items()}
-    for name, columns in streams.items():
+        streams.append((name, [pose.time, pose.position, pose.quaternion]))
+    for side, felt in recording.wrenches.items():
+        streams.append((side, [felt.time, felt.force, felt.torque]))
+    for name, columns in streams:
         if not all(np.isfinite(column).all() for column in columns):
             raise BagError(f"{where}: {name}: expected finite numbers throughout, got NaN; a bag cannot hold it")
     if not streams:
