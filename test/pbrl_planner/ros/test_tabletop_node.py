@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from geometry_msgs.msg import Point
@@ -19,18 +20,21 @@ from pbrl_msgs.msg import Body, Scene
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
+from pbrl_bag.liveness import Liveness
 from pbrl_bringup.graph import node_environment
 from pbrl_bringup.paths import node_executable
+from pbrl_control.ball_arm import BallArm, Strokes
 from pbrl_control.ros.qos import LATCHED
 from pbrl_planner.errors import PlannerError
 from pbrl_planner.ros.desk_hearing import desk_from_msg
 from pbrl_planner.ros.tabletop_node import TabletopNode, objective_of
-from pbrl_planner.tabletop import Desk, Item, Table
+from pbrl_planner.tabletop import Desk, Ending, Item, Table
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tabletop"))
 
 from desk_cases import model_of
 
+URDF = (Path(__file__).resolve().parents[3] / "urdf" / "ball_arm" / "ball_arm.urdf").read_text(encoding="utf-8")
 ERASER = {"kind": "eraser", "pose": [0.1, 0.05, 0.4]}
 TEXT = "terms:\n  - {term: near, items: [eraser], point: [-0.05, 0.05]}\n"
 
@@ -54,6 +58,24 @@ def simulator(tmp_path: Path, stage: Any) -> Iterator[subprocess.Popen]:
     yield process
     process.terminate()
     process.wait(timeout=20.0)
+
+
+class FakeHearing:
+    """All that the node wants to hear of an eraser on a table, and an arm that stands in the picture."""
+
+    def __init__(self) -> None:
+        self._strokes = Strokes(BallArm(URDF, np.array([0.0, -0.45, math.pi / 2])))
+        self.joints = self._strokes.arm.joints(self._strokes.stowed)
+        self.live = Liveness(("/joint_states",), 2.0)
+
+    def missing(self) -> str:
+        return ""
+
+    def desk(self) -> Desk:
+        return Desk(Table.of(0.8, 0.5), (Item("eraser", 0.13, 0.05),))
+
+    def arm(self) -> Strokes:
+        return self._strokes
 
 
 def test_an_eraser_is_pushed_to_where_it_is_wanted(stage: Any, simulator: subprocess.Popen, known: Path) -> None:
@@ -111,6 +133,20 @@ def test_goals_that_make_no_sense_are_refused_in_words(stage: Any, simulator: su
         stage.until(lambda results=results: results)
         assert not results[0].success
         assert words in results[0].message
+
+
+def test_a_goal_that_is_refused_ends_what_was_done_for_the_one_before(stage: Any, known: Path) -> None:
+    node = stage.add(TabletopNode, camera="", model=str(known))
+    node._hearing = FakeHearing()  # and no clock: no tick takes the first goal any further
+    first = stage.ask(Tidy, "/tidy", Tidy.Goal(objective=TEXT, enough=0.03, seed=1))
+    assert node._executive is not None
+    assert node._executive.task is not None
+    second = stage.ask(Tidy, "/tidy", Tidy.Goal(objective="nowhere", enough=math.nan))
+    stage.until(lambda: first and second)
+    assert not first[0].success
+    assert "expected a file" in second[0].message
+    assert node._executive.task is None, "nobody waits for it any more"
+    assert node._executive.ended.ending is Ending.CANCELLED
 
 
 def test_a_file_that_is_no_model_is_refused(stage: Any, tmp_path: Path) -> None:

@@ -127,6 +127,7 @@ class TabletopNode(Node):
 
     def _refuse(self, why: str) -> None:
         self._goal = None
+        self._cancel()  # the goal before was told that this one takes its place: nobody waits for it any more
         self._say(why)
         self._goals.end(Tidy.Result(message=why, cost=math.nan), False)
 
