@@ -48,10 +48,18 @@ class BaseLocalizer:
         self._tags: dict[str, float] = {}  # time of each gripper's last tag
 
     def odometry(self, time: float, pose: Array) -> None:
-        """Take in the pose (3,) of `base` in `odom` at a time [s]; what is not finite or not new is left out."""
+        """Take in the pose (3,) of `base` in `odom` at a time [s]; what is not finite or not new is left out.
+
+        Where it is older than anything that is kept the clock was set back, and all that was known is void.
+        """
         here = np.array(pose, dtype=float)
-        fresh = not self._odometry or time > self._odometry[-1][0]
-        if here.shape != (3,) or not np.isfinite([time, *here]).all() or not fresh:
+        if here.shape != (3,) or not np.isfinite([time, *here]).all():
+            return
+        if self._odometry and time < self._odometry[-1][0] - HISTORY:
+            self._odometry.clear()
+            self._tags.clear()
+            self._odom = None
+        if self._odometry and time <= self._odometry[-1][0]:
             return
         self._odometry.append((time, here))
         while self._odometry[0][0] < time - HISTORY:
@@ -89,9 +97,10 @@ class BaseLocalizer:
     def fault(self, now: float) -> str:
         """Return why the pose is not known at `now` [s], in one line; empty where it is."""
         settings = self._settings
-        if not self._odometry or now - self._odometry[-1][0] > settings.odometry_age:
+        # What is ahead of the clock by so much was heard before the clock was set back.
+        if not self._odometry or abs(now - self._odometry[-1][0]) > settings.odometry_age:
             return f"odometry: expected one in the last {settings.odometry_age} s, got none"
-        if not self._tags or now - max(self._tags.values()) > settings.tag_age:
+        if not self._tags or abs(now - max(self._tags.values())) > settings.tag_age:
             return f"gripper tags: expected a plausible one in the last {settings.tag_age} s, got none"
         return ""
 

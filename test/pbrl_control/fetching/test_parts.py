@@ -55,6 +55,15 @@ def test_sightings_are_averaged_and_jumps_are_not(rng: np.random.Generator) -> N
     assert around.age("table", 8.0) == pytest.approx(1.0)
 
 
+def test_what_was_seen_before_a_clock_was_set_back_is_not_seen_now() -> None:
+    around = Surroundings(0.5)
+    around.take(Percept(tags={"table": Tag(100.0, np.array([1.0, 2.0, 0.8]), LEVEL)}, bodies={"table": TABLE}))
+    assert around.age("table", 3.0) == pytest.approx(97.0)
+    around.take(Percept(tags={"table": Tag(3.0, np.array([1.02, 2.0, 0.8]), LEVEL)}, bodies={"table": TABLE}))
+    assert around.pose("table")[0] == 1.02, "nothing of before is in it"
+    assert around.age("table", 3.5) == pytest.approx(0.5)
+
+
 def test_the_map_is_drawn_anew_only_when_something_moves() -> None:
     around = Surroundings(0.5)
     around.told(ROOM, {})

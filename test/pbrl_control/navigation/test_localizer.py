@@ -86,7 +86,7 @@ def test_a_pose_is_lost_without_fresh_odometry_or_tags(kinematics: RobotKinemati
     for i in range(200):
         localizer.odometry(0.01 * i, np.zeros(3))
         localizer.tag("left", frozen, POSTURE)  # a stream that repeats its last tag is no stream
-    assert localizer.pose(0.9) is not None
+        assert (localizer.pose(0.01 * i) is not None) == (i <= 100)
     assert "gripper tags" in localizer.fault(1.99)
     localizer.tag("right", tag_of(kinematics, START, "right", 1.99), POSTURE)
     assert localizer.fault(1.99) == ""
@@ -124,3 +124,22 @@ def test_longer_smoothing_listens_less_to_a_tag(kinematics: RobotKinematics) -> 
         localizer.tag("left", tag_of(kinematics, START + np.array([0.1, 0.0, 0.0]), "left", 0.1), POSTURE)
         moved.append(away(localizer.pose(0.19), START)[0])
     np.testing.assert_allclose(moved, 0.1 * (1.0 - np.exp(-0.1 / np.array([0.1, 0.4, 2.0]))), rtol=1e-6)
+
+
+@pytest.mark.parametrize("back", [5.0, 1.5])
+def test_a_pose_from_before_a_clock_was_set_back_is_lost_until_there_is_another(
+    kinematics: RobotKinematics, back: float
+) -> None:
+    localizer, elsewhere = BaseLocalizer(kinematics), START + np.array([2.0, 0.0, 0.0])
+    for i in range(1000):
+        localizer.odometry(0.01 * i, np.zeros(3))
+        localizer.tag("left", tag_of(kinematics, START, "left", 0.01 * i), POSTURE)
+    assert localizer.pose(10.0) is not None
+    again = 10.0 - back
+    assert localizer.fault(again)
+    there = elsewhere if back > 2.0 else START
+    for i in range(300):
+        localizer.odometry(again + 0.01 * i, np.zeros(3))
+        localizer.tag("left", tag_of(kinematics, there, "left", again + 0.01 * i), POSTURE)
+    position, _ = away(localizer.pose(again + 3.0), there)
+    assert position < 1e-6

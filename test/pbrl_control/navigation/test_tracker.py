@@ -188,6 +188,16 @@ def test_a_base_that_is_pushed_away_and_one_that_does_not_move_are_given_up() ->
     assert commands[-1].v == 0.0
 
 
+@pytest.mark.parametrize("here", [np.zeros(3), None])
+def test_a_clock_that_is_set_back_does_not_take_away_what_gives_a_drive_up(here: np.ndarray | None) -> None:
+    tracker = PathTracker(straight(), LIMITS)
+    for i in range(20):
+        tracker.step(1000.0 + 0.02 * i, here)
+    commands = [tracker.step(0.02 * i, here) for i in range(900)]
+    assert commands[-1].status is TrackStatus.FAILED
+    assert commands[5].status is not TrackStatus.FAILED, "what is waited for is waited for anew"
+
+
 @pytest.mark.parametrize("path", [straight(), BasePath(np.zeros(3), np.array([0.0, 0.0, 2.0]), ())])
 def test_a_base_that_strains_against_something_unseen_is_given_up_though_its_pose_jitters(
     path: BasePath, rng: np.random.Generator

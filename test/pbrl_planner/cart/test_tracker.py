@@ -71,6 +71,14 @@ def test_readings_a_little_ahead_of_the_clock_set_the_time() -> None:
     assert tracker.now(7.0) == 7.02 and tracker.now(7.1) == 7.1 and tracker.now(3.0) == 3.0
 
 
+def test_a_pose_from_before_a_clock_was_set_back_a_little_is_not_of_now() -> None:
+    tracker = CartTracker()
+    told(tracker, 10.0, np.array([5.0, 0.0, 0.0]))
+    assert tracker.pose_time(10.04) == 10.04
+    assert not tracker.moved(9.4, np.array([4.0, 0.0, 0.0]), np.zeros(3))
+    assert tracker.pose_time(9.4) == 10.0, "the pose is still that of 10.0"
+
+
 def test_odometry_late_is_left_aside_and_a_clock_set_back_begins_anew() -> None:
     tracker = CartTracker()
     told(tracker, 10.0, np.array([5.0, 0.0, 0.0]))

@@ -57,7 +57,7 @@ class Drive:
             ControlError: what driving needs is not seen any more.
         """
         name, settings = self.candidate.object, self._settings
-        self._begun = now if self._begun is None else self._begun
+        self._begun = now if self._begun is None else min(now, self._begun)
         age = around.age(name, now)
         # Planning may have taken its time: what was not looked at meanwhile is not lost.
         if min(age, now - self._begun) > settings.tag_age + settings.patience:

@@ -131,7 +131,7 @@ class FetchExecutive:
         """Return what to do at `now` [s], given the latest percept; never raises for what it perceives."""
         if self.phase in (Phase.DONE, Phase.FAILED):
             return PushCommand(self.phase, self._failure or "done")
-        self._since = now if self._since is None else self._since
+        self._since = now if self._since is None else min(now, self._since)
         self._where.take(now, percept)
         self._around.take(percept)
         try:

@@ -15,6 +15,7 @@ from pbrl_control.planar import Array, wrap
 
 JUMP, JUMP_YAW = 0.05, 0.1  # [m, rad] from where it was: it has moved, nothing to be averaged
 LONGEST_PERIOD = 0.2  # [s] that one sighting stands for at most
+SET_BACK = 1.0  # [s] that a tag is older than the one before where the clock was set back
 REDRAW, REDRAW_YAW = 0.003, 0.003  # [m, rad] that something moves before the map is drawn anew: gaps are narrow
 
 
@@ -48,13 +49,18 @@ class Surroundings:
         self._room, self._fixed, self._drawn = room, dict(fixed), None
 
     def take(self, percept: Percept) -> None:
-        """Take in shapes and tags; tags that are not new or not finite are left out."""
+        """Take in shapes and tags; tags that are not new or not finite are left out.
+
+        One that is older by much is of a clock that was set back, and nothing is averaged with what was before.
+        """
         self._shapes = percept.bodies
         for name in percept.bodies:
             tag = percept.tags.get(name)
             if tag is None or not tag.finite():
                 continue
             time, before = self._seen.get(name, (-math.inf, None))
+            if tag.time < time - SET_BACK:
+                time, before = -math.inf, None
             if tag.time <= time:
                 continue
             pose = object_planar(tag)
@@ -69,8 +75,11 @@ class Surroundings:
         return self._fixed.get(name) if seen is None else seen[1]
 
     def age(self, name: str, now: float) -> float:
-        """Return how long ago [s] a body's tag was seen; infinite where it never was."""
-        return now - self._seen[name][0] if name in self._seen else math.inf
+        """Return how long ago [s] a body's tag was seen; infinite where it never was.
+
+        Of a stamp ahead of `now` it is how far it is ahead: such a tag was seen before the clock was set back.
+        """
+        return abs(now - self._seen[name][0]) if name in self._seen else math.inf
 
     def height(self, name: str) -> float:
         """Return the height of a known body [m]."""

@@ -35,6 +35,8 @@ class Whereabouts:
     def take(self, now: float, percept: Percept) -> None:
         """Take in joints and gripper tags as they are known at `now` [s]."""
         posture = percept.posture
+        if self._postures and now < self._postures[-1][0]:  # a clock that was set back
+            self._postures.clear()
         if posture is not None and np.isfinite(posture.vector()).all():
             self._postures.append((now, posture))
         while self._postures and self._postures[0][0] < now - KEPT:

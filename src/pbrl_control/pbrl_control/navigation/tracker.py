@@ -112,9 +112,12 @@ class PathTracker:
         """Return the velocities to drive with from now on.
 
         Args:
-            now: [s], never running backwards.
+            now: [s]; where it has run backwards what is waited for is waited for anew.
             pose: (3,) of `base` in `world` [m, rad]; None where it is not known.
         """
+        if self._last is not None and now < self._last:  # a clock that was set back
+            self._progress = self._stretch = None
+            self._trouble = None if self._trouble is None else now
         dt = 0.0 if self._last is None else float(np.clip(now - self._last, 0.0, LONGEST_PERIOD))
         self._last = now
         if self._ended:

@@ -88,8 +88,11 @@ class CartTracker:
         return self.whereabouts.pose(now)
 
     def pose_time(self, now: float) -> float:
-        """Return of when the base's pose is [s]: of now, while odometry leads it on for less than 50 ms."""
-        return now if now - self.whereabouts.time < 0.05 else self.whereabouts.time
+        """Return of when the base's pose is [s]: of now, while odometry leads it on for less than 50 ms.
+
+        After a clock was set back by less than odometry shows it is one ahead of `now`, which nobody relies upon.
+        """
+        return now if abs(now - self.whereabouts.time) < 0.05 else self.whereabouts.time
 
     def sight(self, now: float) -> CartSight | None:
         """Return the reading of the cart that can be relied upon at `now` [s]."""
