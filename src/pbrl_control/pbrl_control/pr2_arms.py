@@ -66,9 +66,9 @@ class Pr2Arms:
             positions: (n,) of them [rad], [m]; other joints are taken at zero.
 
         Raises:
-            ControlError: an arm's joint is missing.
+            ControlError: an arm's joint is missing, or there are not as many positions as names.
         """
-        table = dict(zip(names, map(float, positions), strict=True))
+        table = _table(names, positions)
         missing = [name for name in self._names if name not in table]
         if missing:
             raise ControlError(f"joint states: expected both arms' joints, {missing[0]} is missing")
@@ -98,9 +98,9 @@ class Pr2Arms:
             positions: (n,) of them [rad], [m]; other joints are taken at zero.
 
         Raises:
-            ControlError: there is no such frame.
+            ControlError: there is no such frame, or there are not as many positions as names.
         """
-        table = dict(zip(names, map(float, positions), strict=True))
+        table = _table(names, positions)
         pin.forwardKinematics(self._model, self._data, self._configuration(table))
         placed = pin.updateFramePlacement(self._model, self._data, self._frame(frame))
         return np.array(placed.homogeneous)
@@ -128,3 +128,9 @@ class Pr2Arms:
             else:
                 q[joint.idx_q] = angle
         return np.asarray(q)
+
+
+def _table(names: Sequence[str], positions: Sequence[float] | Array) -> dict[str, float]:
+    if len(names) != len(positions):
+        raise ControlError(f"joint states: expected a position a name, {len(names)}, got {len(positions)}")
+    return dict(zip(names, map(float, positions), strict=True))

@@ -116,6 +116,16 @@ def test_a_silent_laser_stops_it_within_the_time_allowed(driving: Driving) -> No
     assert results[0].outcome == Result.REPLAN and "laser" in results[0].message
 
 
+def test_joint_states_without_a_position_a_name_are_left_aside(driving: Driving) -> None:
+    results = driving.go()
+    driving.tick_until(lambda: driving.speed() > 0.25, 40)
+    good, driving.joints = driving.joints, JointState(name=driving.joints.name, position=[0.0])
+    driving.tick()
+    driving.joints = good
+    driving.tick_until(lambda: results, 120)
+    assert results[0].outcome == Result.ARRIVED, results[0].message
+
+
 def test_a_hand_that_loses_the_cart_ends_the_drive_and_says_which(driving: Driving) -> None:
     results = driving.go(2.0)
     driving.tick_until(lambda: driving.speed() > 0.2, 60)

@@ -112,6 +112,10 @@ class CartControllerNode(Node):
             self.get_logger().error(str(error))
 
     def _on_joints(self, message: JointState) -> None:
+        if len(message.name) != len(message.position):
+            what = f"expected a position a name, {len(message.name)}, got {len(message.position)}"
+            self.get_logger().warning(f"/joint_states is left aside: {what}", throttle_duration_sec=SAID)
+            return
         self._joints = message
 
     def _on_costmap(self, message: OccupancyGrid) -> None:
