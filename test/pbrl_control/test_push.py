@@ -9,12 +9,13 @@ import pytest
 
 from pbrl_control.course import Course, CourseStep
 from pbrl_control.percept import BodyShape, Grip, Percept, Tag
-from pbrl_control.push import GripperAnswer, Phase, PushCommand, PushExecutive
+from pbrl_control.push import GripperAnswer, GripperRequest, Phase, PushCommand, PushExecutive
 from pbrl_control.push_plan import PushPlan
 from pbrl_control.types import Hold, PlanarTwist
 
 TABLE = BodyShape(np.array([[-0.375, -0.75], [0.375, -0.75], [0.375, 0.75], [-0.375, 0.75]]), 0.7775)
 FORWARD = np.array([0.0, 0.0, -np.sqrt(0.5), np.sqrt(0.5)])  # left gripper's +y along world x
+BACKWARD = FORWARD * [1.0, 1.0, -1.0, 1.0]  # a right one's along -x
 PLAN = PushPlan.model_validate(
     {
         "name": "p",
@@ -139,6 +140,30 @@ def test_a_failed_push_lets_go_before_it_says_so() -> None:
         now += 0.01
     assert released == ["release"]
     assert "expected at most 150 N, got 400 N" in command.status
+
+
+@pytest.mark.parametrize("shown", [0.0, 0.05], ids=["at once", "after the answers"])
+def test_one_hand_that_closed_is_opened_again_when_the_other_was_refused(shown: float) -> None:
+    grips = [{"gripper": "left", "point": [-0.375, 0.4]}, {"gripper": "right", "point": [-0.375, -0.4]}]
+    executive = PushExecutive(PushPlan.model_validate({**PLAN.model_dump(), "grips": grips}))
+    closed: float | None = None
+    asked: list[tuple[str, str]] = []
+    now = 0.0
+    while executive.phase != Phase.FAILED and now < 60.0:
+        holds = HELD if closed is not None and now >= closed + shown else {}
+        percept = seen(now, grips=holds)
+        left = percept.tags["left_gripper"]
+        tags = {**percept.tags, "right_gripper": Tag(now, left.position - np.array([0.0, 0.8, 0.0]), BACKWARD)}
+        command = executive.tick(now, seen(now, grips=holds, tags=tags))
+        for request in command.requests:
+            asked.append((request.action, request.side))
+            clamps = request == GripperRequest("grasp", "left", "table")
+            closed = now if clamps else None if request == GripperRequest("release", "left", "table") else closed
+            executive.answer(GripperAnswer(request.action, request.side, clamps or request.action == "release"))
+        now += 0.01
+    assert asked[:2] == [("grasp", "left"), ("grasp", "right")]
+    assert ("release", "left") in asked[2:]
+    assert "right gripper refused 'table'" in command.status
 
 
 @pytest.mark.parametrize("tag", ["table", "left_gripper"])

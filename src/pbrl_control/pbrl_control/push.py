@@ -102,6 +102,7 @@ class PushExecutive:
         self._approacher: Approacher | None = None
         self._bias: dict[str, WrenchBias] = {side: WrenchBias(0.3) for side in self._sides}
         self._answers: dict[str, GripperAnswer] = {}
+        self._clamped: set[str] = set()  # that have closed, as they answered; /grasps may not show it yet
         self._asked = False
         self._attempts = 0
         self._failure = ""
@@ -123,6 +124,8 @@ class PushExecutive:
         """Take in what came of a request."""
         if answer.side in self._sides:
             self._answers[answer.side] = answer
+            if answer.success:
+                (self._clamped.add if answer.action == "grasp" else self._clamped.discard)(answer.side)
 
     def tick(self, now: float, percept: Percept) -> PushCommand:
         """Return what to do at `now` [s], given the latest percept; never raises for what it perceives."""
@@ -173,13 +176,14 @@ class PushExecutive:
         refused = [answer for answer in self._answers.values() if not answer.success]
         if not refused:
             if all(side in percept.grips for side in self._sides):
+                self._clamped.clear()  # from now on /grasps tells
                 self._enter(Phase.SETTLE, now)
             else:
                 self._check_answer_time(now)
             return self._rest("closed", percept)
         first = refused[0]
         sentence = f"{first.side} gripper refused {self.plan.object!r}: {first.message} ({first.distance:.3f} m off)"
-        if self._attempts >= self.plan.limits.grasp_attempts or self._closed(percept):
+        if self._attempts >= self.plan.limits.grasp_attempts or self._holding(percept):
             raise ControlError(f"{sentence}; gave up after {self._attempts} attempts")
         if self._approacher is not None:
             self._approacher.go_deeper(first.distance)
@@ -209,9 +213,9 @@ class PushExecutive:
         if not self._asked:
             self._asked = True
             return self._rest("opening", percept, self._requests("release"))
-        if self._closed(percept) and now - self._since < ANSWER_TIME + self.plan.settle:
+        if self._holding(percept) and now - self._since < ANSWER_TIME + self.plan.settle:
             return self._rest("opening", percept)
-        if self._closed(percept):
+        if self._holding(percept):
             self._failure = self._failure or f"gripper did not open in {ANSWER_TIME:.0f} s"
             return self._end(now)
         self._enter(Phase.RETREAT, now)
@@ -230,7 +234,7 @@ class PushExecutive:
     def _fail(self, now: float, sentence: str, percept: Percept) -> PushCommand:
         """Give up: open what is closed first, then say why."""
         self._failure = self._failure or sentence
-        if not self._closed(percept) or self.phase in (Phase.APPROACH, Phase.RELEASE, Phase.RETREAT):
+        if not self._holding(percept) or self.phase in (Phase.APPROACH, Phase.RELEASE, Phase.RETREAT):
             return self._end(now)
         self._enter(Phase.RELEASE, now)
         return self._rest(f"giving up: {self._failure}", percept)
@@ -238,6 +242,10 @@ class PushExecutive:
     def _closed(self, percept: Percept) -> list[str]:
         """Return which of this push's grippers hold something."""
         return [side for side in self._sides if side in percept.grips]
+
+    def _holding(self, percept: Percept) -> bool:
+        """Return whether one of this push's grippers holds something, or has answered that it does."""
+        return bool(self._closed(percept) or self._clamped)
 
     def _enter(self, phase: Phase, now: float) -> None:
         self.phase, self._since, self._asked = phase, now, False
