@@ -17,6 +17,7 @@ from geometry_msgs.msg import Point, Twist, TwistStamped
 from pbrl_msgs.msg import Body, ObjectModel, ObjectModels, Scene
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
@@ -128,8 +129,12 @@ def moved(posture: Posture, turn: int) -> Posture:
     return replace(posture, left=posture.left + 1e-6 * turn)
 
 
-def test_an_emergency_stop_is_rest_until_it_is_lifted(spin_with, push_posture: Posture, root: Path) -> None:
+@pytest.mark.parametrize("qos", [LATCHED, COMMANDS], ids=["latched", "as by default"])
+def test_an_emergency_stop_is_rest_until_it_is_lifted(
+    spin_with, push_posture: Posture, root: Path, qos: QoSProfile
+) -> None:
     _, world, until = spin_with(BodyControllerNode)
+    emergency = world.create_publisher(Bool, "/emergency_stop", qos)
     world.description.publish(String(data=(root / "urdf/krang/krang.urdf").read_text()))
     forward, now = ("base", PlanarTwist(vx=0.3)), [0.0]
 
@@ -138,13 +143,13 @@ def test_an_emergency_stop_is_rest_until_it_is_lifted(spin_with, push_posture: P
         world.tell(now[0], moved(push_posture, round(now[0] / 0.02)), forward)
 
     until(lambda: bool(world.base) and world.base[-1].linear.x > 0.05, drive)
-    world.emergency.publish(Bool(data=True))
+    emergency.publish(Bool(data=True))
     until(lambda: world.base[-1].linear.x == 0.0 and bool(world.reports), drive)
     assert "emergency stop" in world.reports[-1]
     for turn in range(10):
         drive(turn)
     until(lambda: world.base[-1].linear.x == 0.0, drive)
-    world.emergency.publish(Bool(data=False))
+    emergency.publish(Bool(data=False))
     until(lambda: world.base[-1].linear.x > 0.05, drive)
     assert world.reports[-1] == "ok"
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.subscription import Subscription
@@ -93,6 +94,7 @@ class Diagnostics:
         *,
         needed: bool = True,
         refuses: tuple[type[Exception], ...] = (),
+        events: SubscriptionEventCallbacks | None = None,
     ) -> Subscription:
         """Subscribe the node to a topic of its namespace, and keep account of it.
 
@@ -103,6 +105,7 @@ class Diagnostics:
             qos: as for any subscription; what is latched comes when it changes, and is not missed when it does not.
             needed: whether the node can do nothing without it.
             refuses: errors that `callback` raises of a message that cannot be used; it is left aside with a warning.
+            events: what is done where a publisher does not match; None: rclpy warns.
         """
         stream = qos.durability != DurabilityPolicy.TRANSIENT_LOCAL
         entry = self.input("/" + topic.removeprefix("/"), needed=needed, stream=stream)
@@ -115,7 +118,7 @@ class Diagnostics:
                 told = " ".join(str(error).split())
                 self._node.get_logger().warning(f"{entry.topic}: left aside: {told}", throttle_duration_sec=SAID)
 
-        return self._node.create_subscription(kind, relative(topic), counted, qos)
+        return self._node.create_subscription(kind, relative(topic), counted, qos, event_callbacks=events)
 
     def status(self, now: float) -> DiagnosticStatus:
         """Return the status at a time of the steady clock [s]; rates are those since it was asked last."""

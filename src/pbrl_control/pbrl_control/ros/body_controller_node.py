@@ -22,6 +22,7 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, WrenchStamped
 from pbrl_msgs.msg import Grasps, Scene
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, String
@@ -64,6 +65,8 @@ from pbrl_control.whole_body.prepare import compile_kernels
 JOINTS = "joint positions"
 TAGS = "tags"
 SIGN_OF_LIFE = 0.2  # [s of the wall clock] between two while nothing is commanded
+UNMATCHED = SubscriptionEventCallbacks(use_default_callbacks=False)
+"""Says nothing where a publisher does not match: another subscription hears it."""
 STIRS = 0.02  # [rad/s] of a joint, at which its position has to change
 
 
@@ -122,7 +125,9 @@ class BodyControllerNode(Node):
         hear(Scene, "scene", self._on_scene, LATCHED, needed=False, refuses=(BagError,))
         hear(Grasps, "grasps", self._on_grasps, LATCHED, needed=False)
         hear(TwistStamped, "object_twist_command", self._on_twist, COMMANDS, needed=False)
-        hear(Bool, "emergency_stop", self._on_emergency, LATCHED, needed=False)
+        # Whoever stops it may publish as topics are by default, which a latched subscription alone never hears.
+        for qos in (LATCHED, COMMANDS):
+            hear(Bool, "emergency_stop", self._on_emergency, qos, needed=False, events=UNMATCHED)
         for side in SIDES:
             hear(WrenchStamped, f"wrist_ft/{side}", partial(self._on_wrench, side), NEWEST, needed=False)
             expected = f"expected_grip_wrench/{side}"
