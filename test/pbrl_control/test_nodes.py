@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import rclpy
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point, Twist, TwistStamped
+from geometry_msgs.msg import Point, PoseStamped, Twist, TwistStamped
 from pbrl_msgs.msg import Body, ObjectModel, ObjectModels, Scene
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -273,6 +273,32 @@ def test_a_trajectory_is_followed_as_the_learned_model_allows(spin_with, push_po
     models.publish(ObjectModels(models=[learned]))
     until(lambda: node._learned.samples[0] == -1.0, lambda turn: world.tell(20.0 + 0.02 * turn, push_posture))
     assert node._course.model.mass == 33.0, "what has no mass is left aside"
+
+
+@pytest.mark.parametrize("spin_with", [["-p", "push_node:trajectory:=turn_about_caster"]], indirect=True)
+def test_a_learned_hinge_counts_from_the_first_tag_on(spin_with, push_posture: Posture) -> None:
+    node, world, until = spin_with(PushNode)
+    models = world.create_publisher(ObjectModels, "/object_models", LATCHED)
+    scene = world.create_publisher(Scene, "/scene", LATCHED)
+    tags = world.create_publisher(PoseStamped, "/ar_tags/table_a/pose", COMMANDS)
+    names = {"mass": 33.0, "anchor_x": -0.3, "anchor_y": 0.0, "hinge_x": 0.2, "hinge_y": 2.0, "hinge_radius": 0.5}
+    learned = ObjectModel(object="table_a", model_class="hinge", parameters=list(names), draws=1)
+    learned.units, learned.samples = [UNITS[name] for name in names], list(names.values())
+    models.publish(ObjectModels(models=[learned]))
+    corners = [Point(x=x, y=y) for x, y in ((-0.4, -0.7), (0.4, -0.7), (0.4, 0.7), (-0.4, 0.7))]
+    scene.publish(Scene(bodies=[Body(name="table_a", footprint=corners, height=0.77)]))
+    until(lambda: node._learned and node._bodies, lambda turn: world.tell(0.02 * turn, push_posture))
+    assert node._course.model is None, "where it is has not been seen yet"
+    assert not node._course.refused
+    message = PoseStamped()
+    message.pose.position.x, message.pose.position.y, message.pose.orientation.w = 1.0, 2.0, 1.0
+
+    def see(turn: int) -> None:
+        tags.publish(message)
+        world.tell(5.0 + 0.02 * turn, push_posture)
+
+    until(lambda: node._course.model is not None, see)
+    assert node._course.model.parameters.hinge_radius == 0.5
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ from pbrl_control.grasp_plan import GraspPlan
 from pbrl_control.installed import params_folder
 from pbrl_control.kinematics import SIDES, Posture, RobotKinematics
 from pbrl_control.loop import Executive
-from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag
+from pbrl_control.percept import BodyShape, Grip, Percept, Tag, gripper_tag, object_planar
 from pbrl_control.planar import Array
 from pbrl_control.push import GripperAnswer, GripperRequest, Phase, PushCommand, PushExecutive
 from pbrl_control.push_plan import load_plan
@@ -96,6 +96,7 @@ class PushNode(Node):
         self._scene: Scene | None = None
         self._floor: tuple[Array | None, dict[str, Array]] | None = None
         self._learned: ObjectModel | None = None
+        self._place: Array | None = None  # (3,) of the object in `world`, of its last tag
         self._share = 1.0
         self._phase = self._failure = ""
         self._diagnostics = Diagnostics(self, lambda: self._phase, lambda: self._failure)
@@ -196,15 +197,17 @@ class PushNode(Node):
         self._take_model()
 
     def _take_model(self) -> None:
-        """Act on what was learned of the object, once its outline is known too."""
+        """Act on what was learned of the object, once its outline is known too, and where it is if that matters."""
         name = self._plan.object
         shape, learned = self._bodies.get(name), self._learned
         if shape is None or learned is None:
             return
+        if self._place is None and "hinge_radius" in learned.parameters:
+            return  # about which point it turns is known with the object's first tag
         try:
-            belief = ClassBelief.of(posterior_from_msg(learned), shape.footprint)
+            belief = ClassBelief.of(posterior_from_msg(learned), shape.footprint, self._place)
             if self._sampled is not None:
-                self._sampled.model = grasp_model(Freedom.of(belief.model))
+                self._sampled.model = grasp_model(Freedom.of(belief.model, self._place))
         except (ControlError, ModelError) as error:
             self.get_logger().error(f"model of {name!r} is left aside: {error}")
             if self._course is not None and self._course.model is None:
@@ -222,7 +225,11 @@ class PushNode(Node):
         self._wrenches[side] = wrench_from_msg(message)
 
     def _on_tag(self, name: str, message: PoseStamped) -> None:
-        self._tags[name] = tag_from_msg(message)
+        tag = self._tags[name] = tag_from_msg(message)
+        if name == self._plan.object and tag.finite():
+            first, self._place = self._place is None, object_planar(tag)
+            if first:
+                self._take_model()
 
     def _tick(self) -> None:
         if self._executive is None:
