@@ -67,6 +67,7 @@ TAGS = "tags"
 SIGN_OF_LIFE = 0.2  # [s of the wall clock] between two while nothing is commanded
 UNMATCHED = SubscriptionEventCallbacks(use_default_callbacks=False)
 """Says nothing where a publisher does not match: another subscription hears it."""
+SLOWEST = 20.0  # [Hz] of ticks: base and arms stop 0.1 s after a command
 STIRS = 0.02  # [rad/s] of a joint, at which its position has to change
 
 
@@ -76,8 +77,10 @@ class BodyControllerNode(Node):
     def __init__(self) -> None:
         super().__init__("body_controller_node")
         path = declare(self, "settings", "", "YAML of gains and limits; empty: body_controller.yaml as installed")
-        rate = "ticks a second of the wall clock [Hz]; 0: with every /joint_states"
+        rate = f"ticks a second of the wall clock [Hz], {SLOWEST:g} at least; 0: with every /joint_states"
         self._rate: float = declare(self, "rate", 0.0, rate, (0.0, 1000.0))
+        if 0.0 < self._rate < SLOWEST:
+            raise BagError(f"rate: expected 0, or {SLOWEST:g} to 1000 ({rate}), got {self._rate:.10g}")
         first = "real-time priority (SCHED_FIFO), 1 to 99, beside a rate; 0: none"
         self.priority: int = declare(self, "priority", 0, first, (0, 99))
         refuse_unknown(self)

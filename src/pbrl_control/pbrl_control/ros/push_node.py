@@ -76,7 +76,7 @@ class PushNode(Node):
         text = "of a fetch: plan, as it says; sampled, as the object's model allows"
         grips = declare(self, "grips", "plan", text, choices=("plan", "sampled"))
         self._exit = declare(self, "exit_when_done", False, "end with exit code 0 when done, 1 when failed")
-        rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (10.0, 200.0))
+        rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (20.0, 200.0))
         refuse_unknown(self)
         if grips == "sampled" and not fetch:
             raise ControlError("grips: expected plan, or sampled together with fetch:=true, got sampled alone")

@@ -72,7 +72,7 @@ class NamoNode(Node):
     def __init__(self) -> None:
         super().__init__("namo_node")
         goal = declare(self, "goal", "", '"x y" or "x y theta" in world [m, rad], at once; empty: wait for one')
-        rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (10.0, 200.0))
+        rate = declare(self, "rate", 50.0, "ticks a second, on the node's clock [Hz]", (20.0, 200.0))
         self._seed = declare(self, "seed", 0, "seed of every draw, for goals that bring none", (0, 2**31 - 1))
         memory = declare(self, "memory", MEMORY, "most that is kept of what was heard [MB]", (10.0, 4000.0))
         refuse_unknown(self)
