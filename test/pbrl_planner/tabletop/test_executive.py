@@ -185,6 +185,22 @@ def test_halted_in_mid_push_nothing_is_moved_any_more() -> None:
     assert stage.executive.ended.ending is Ending.TIDY, "the next one begins where the arm is"
 
 
+@pytest.mark.parametrize("state", [State.PUSHING, State.LOOKING])
+def test_a_clock_that_is_set_back_ends_it_and_the_next_one_is_carried_out(state: State) -> None:
+    stage = Stage(Two())
+    stage.now = 1000.0
+    stage.executive.begin(stage.task, stage.now, stage.joints)
+    while stage.executive.state is not state:
+        stage.step()
+    stage.now = 3.0
+    assert stage.executive.tick(stage.now, stage.joints) is None, "nothing is moved any more"
+    assert stage.executive.ended is not None
+    assert stage.executive.ended.ending is Ending.SET_BACK
+    stage.task = Two()
+    stage.run(120.0)
+    assert stage.executive.ended.ending is Ending.TIDY
+
+
 def test_an_answer_that_comes_too_late_does_nothing() -> None:
     stage = Stage(Two())
     stage.executive.answer(NextPush(0, Push("+x"), np.zeros((2, 2))), 0.0, stage.joints)

@@ -92,6 +92,8 @@ class DeskExecutive:
             now: time [s].
             joints: (4,) where the arm is [rad].
         """
+        if now < self._ticked:  # by a simulator begun anew: arm and items are elsewhere
+            self.halt(Ended(Ending.SET_BACK, f"by {self._ticked - now:.2f} s; give the goal again"))
         self._go_on_after_standing(now)
         if self.state is State.LOOKING and now > self._looked + BLIND:
             self.halt(Ended(Ending.BLIND, f"no picture of it for {BLIND:.0f} s; is the camera running?"))

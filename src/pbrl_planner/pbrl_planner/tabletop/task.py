@@ -22,6 +22,7 @@ class Ending(Enum):
     LOST = "an item is not seen"
     BLIND = "the table is not seen"
     SILENT = "the arm is not heard"
+    SET_BACK = "the clock was set back"
     BLOCKED = "an item is where it cannot be: on another, or over the border"
     UNREACHED = "the arm does not reach a push"
     CANCELLED = "it is not wanted any more"
