@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from pbrl_control.errors import ControlError
 from pbrl_control.fence import Fence
@@ -110,6 +111,12 @@ def test_a_clock_that_is_set_back_is_a_new_beginning(kinematics: RobotKinematics
     away = np.array([-5.0, 5.0, 0.0])
     fence.fault(100.0, seen(kinematics, push_posture, time=100.0), ON)
     assert fence.fault(1.0, seen(kinematics, push_posture, away, time=1.0), ON) == ""
+
+
+@pytest.mark.parametrize("corners", [0, 1, 2])
+def test_corners_that_make_no_polygon_are_refused_where_they_are_read(corners: int) -> None:
+    with pytest.raises(ValidationError, match="keep_out"):
+        FenceSettings(keep_out=(square(AHEAD, 0.1)[:corners],))
 
 
 def test_a_polygon_that_is_none_is_refused(kinematics: RobotKinematics) -> None:

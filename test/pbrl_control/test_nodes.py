@@ -15,6 +15,7 @@ import rclpy
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, PoseStamped, Twist, TwistStamped
 from pbrl_msgs.msg import Body, ObjectModel, ObjectModels, Scene
+from rcl_interfaces.msg import Log
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -152,6 +153,23 @@ def test_an_emergency_stop_is_rest_until_it_is_lifted(
     emergency.publish(Bool(data=False))
     until(lambda: world.base[-1].linear.x > 0.05, drive)
     assert world.reports[-1] == "ok"
+
+
+def test_a_scene_whose_fence_touches_itself_is_left_aside(spin_with, push_posture: Posture, root: Path) -> None:
+    node, world, until = spin_with(BodyControllerNode)
+    scene = world.create_publisher(Scene, "/scene", LATCHED)
+    world.description.publish(String(data=(root / "urdf/krang/krang.urdf").read_text()))
+    until(lambda: node._fence is not None, lambda turn: world.tell(0.02 * turn, push_posture))
+    crossed = [Point(x=x, y=y) for x, y in ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.0), (0.0, 2.0))]
+    whole = [Point(x=x, y=y) for x, y in ((5.0, 5.0), (6.0, 5.0), (6.0, 6.0), (5.0, 6.0))]
+    logged: list[str] = []
+    world.create_subscription(Log, "/rosout", lambda message: logged.append(message.msg), 10)
+    scene.publish(Scene(bodies=[Body(name="keep_out_0", footprint=crossed, height=3.0)]))
+    until(lambda: any("left aside: keep_out_0" in each for each in logged), lambda _: None)
+    assert not node._bodies
+    scene.publish(Scene(bodies=[Body(name="keep_out_0", footprint=whole, height=3.0)]))
+    until(lambda: node._bodies, lambda _: None)
+    assert node._fence.stands
 
 
 def test_joint_positions_that_freeze_stop_the_robot(spin_with, push_posture: Posture, root: Path) -> None:

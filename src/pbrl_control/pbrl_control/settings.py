@@ -16,6 +16,7 @@ NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Arm = tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite]
 Planar = tuple[Finite, Finite, Finite]
+Corners = Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=3)]
 
 
 def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
@@ -150,7 +151,7 @@ class FenceSettings(Section):
         ahead: time for which a command is looked ahead: until what it leads to could have been braked [s].
     """
 
-    keep_out: tuple[tuple[tuple[Finite, Finite], ...], ...] = ()
+    keep_out: tuple[Corners, ...] = ()
     clear: Positive = 0.02
     graze: NotNegative = 0.04
     ahead: Positive = 0.3

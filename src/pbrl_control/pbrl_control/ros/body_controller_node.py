@@ -125,7 +125,7 @@ class BodyControllerNode(Node):
         hear = self._diagnostics.subscribe
         hear(String, "robot_description", self._on_description, LATCHED)
         hear(JointState, "joint_states", self._on_joints, NEWEST)
-        hear(Scene, "scene", self._on_scene, LATCHED, needed=False, refuses=(BagError,))
+        hear(Scene, "scene", self._on_scene, LATCHED, needed=False, refuses=(BagError, ControlError))
         hear(Grasps, "grasps", self._on_grasps, LATCHED, needed=False)
         hear(TwistStamped, "object_twist_command", self._on_twist, COMMANDS, needed=False)
         # Whoever stops it may publish as topics are by default, which a latched subscription alone never hears.
@@ -160,11 +160,12 @@ class BodyControllerNode(Node):
             self.get_logger().error(str(error))
 
     def _on_scene(self, message: Scene) -> None:
-        self._bodies, self._fixed = bodies_from_msg(message), fixed_from_msg(message)
+        bodies, fixed = bodies_from_msg(message), fixed_from_msg(message)
+        if self._fence is not None:
+            self._fence.told(bodies, fixed)
+        self._bodies, self._fixed = bodies, fixed
         for name in movable_from_msg(message):
             self._listen_to_tag(name)
-        if self._fence is not None:
-            self._fence.told(self._bodies, self._fixed)
 
     def _on_grasps(self, message: Grasps) -> None:
         self._grips = grips_from_msg(message)
