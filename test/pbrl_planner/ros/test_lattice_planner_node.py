@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,12 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path as PathMsg
 from pbrl_msgs.action import PlanCartPath
+from rcl_interfaces.msg import Log
 from visualization_msgs.msg import MarkerArray
 
 from pbrl_control.planar import Array
 from pbrl_control.ros.qos import LATCHED
+from pbrl_planner.cart.navigator import Navigator
 from pbrl_planner.costmap import LETHAL, CostField
 from pbrl_planner.ros.conversions import path_from_msg, pose_to_msg
 from pbrl_planner.ros.lattice_planner_node import LatticePlannerNode
@@ -59,6 +62,26 @@ def planning(stage: Any) -> Planning:
 def test_before_anything_is_known_it_says_what_is_missing(planning: Planning) -> None:
     done = planning.ask(at(3.0, 1.5, 0.0))
     assert done.outcome == Result.NOT_READY and "/global_costmap/costmap" in done.message
+
+
+def test_it_is_busy_while_it_prepares_and_says_where_that_fails(
+    planning: Planning, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    enough, logged = threading.Event(), planning.stage.hear(Log, "/rosout")
+
+    def fail(_: Navigator, __: CostField) -> None:
+        enough.wait(60.0)
+        raise MemoryError("no room for that")
+
+    monkeypatch.setattr(Navigator, "prepare", fail)
+    try:
+        planning.on(floor())
+        planning.stage.until(lambda: planning.node._prepared is not None)
+        assert planning.node.thinking, "Python would wait for its thread"
+    finally:
+        enough.set()
+    planning.stage.until(lambda: any("no room for that" in each.msg for each in logged))
+    assert not planning.node.thinking
 
 
 def test_each_question_has_its_answer(planning: Planning) -> None:

@@ -7,8 +7,10 @@ import math
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -147,6 +149,22 @@ def test_a_goal_that_is_refused_ends_what_was_done_for_the_one_before(stage: Any
     assert "expected a file" in second[0].message
     assert node._executive.task is None, "nobody waits for it any more"
     assert node._executive.ended.ending is Ending.CANCELLED
+
+
+def test_a_thought_that_nobody_wants_any_more_is_still_thought(stage: Any, known: Path) -> None:
+    node = stage.add(TabletopNode, camera="", model=str(known))
+    node._hearing = FakeHearing()
+    stage.ask(Tidy, "/tidy", Tidy.Goal(objective=TEXT, enough=0.03, seed=1))
+    enough = threading.Event()
+    executive = SimpleNamespace(question={}, task=SimpleNamespace(next=lambda _: enough.wait(60.0)))
+    try:
+        node._think_or_answer(executive, 0.0, node._hearing.joints)
+        assert node.thinking
+        stage.ask(Tidy, "/tidy", Tidy.Goal(objective=TEXT, enough=0.03, seed=1))
+        assert node.thinking, "Python would wait for its thread"
+    finally:
+        enough.set()
+    stage.until(lambda: not node.thinking)
 
 
 def test_a_file_that_is_no_model_is_refused(stage: Any, tmp_path: Path) -> None:

@@ -83,8 +83,8 @@ class LatticePlannerNode(Node):
 
     @property
     def thinking(self) -> bool:
-        """Whether it is planned: the thread cannot be stopped at once."""
-        return self._work is not None and not self._work.done()
+        """Whether it is planned, or prepared for that: the thread cannot be stopped at once."""
+        return any(each is not None and not each.done() for each in (self._work, self._prepared))
 
     def destroy_node(self) -> None:
         """Leave the graph; a thread that plans is left to itself."""
@@ -102,6 +102,7 @@ class LatticePlannerNode(Node):
         # What every plan needs takes seconds: not in the first one.
         if cart is not None and self._field is not None and self._prepared is None:
             self._prepared = self._thread.submit(self._prepare, cart, self._field)
+            self._prepared.add_done_callback(self._complain)
 
     def _want(self, goal: PlanCartPath.Goal) -> None:
         """Plan for a goal, once the thread is done with the one before."""
@@ -145,6 +146,10 @@ class LatticePlannerNode(Node):
 
     def _prepare(self, cart: Array, field: CostField) -> None:
         Navigator(self._motions(cart), self._settings.planner).prepare(field)
+
+    def _complain(self, prepared: Future[object]) -> None:
+        if not prepared.cancelled() and (error := prepared.exception()) is not None:
+            self.get_logger().error(f"preparing to plan failed: {error!r}")
 
     def _motions(self, cart: Array) -> Motions:
         length, width = np.ptp(cart, axis=0)

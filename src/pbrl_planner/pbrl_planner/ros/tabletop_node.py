@@ -81,6 +81,7 @@ class TabletopNode(Node):
         self._known = Knowledge(kind, self._planning.travels, file=Path(model) if model else None)
         self._goal: _Goal | None = None
         self._thought: Future[NextPush | Ended] | None = None
+        self._newest: Future[NextPush | Ended] | None = None  # that the thinker was given, wanted still or not
         self._thinker = ThreadPoolExecutor(1)
         self._executive: DeskExecutive | None = None
         diagnostics = Diagnostics(self, lambda: self._say.sentence)
@@ -96,7 +97,7 @@ class TabletopNode(Node):
     @property
     def thinking(self) -> bool:
         """Whether a search is under way that cannot be stopped."""
-        return self._thought is not None and not self._thought.done()
+        return self._newest is not None and not self._newest.done()
 
     def destroy_node(self) -> None:
         """Leave the graph."""
@@ -161,7 +162,7 @@ class TabletopNode(Node):
 
     def _think_or_answer(self, executive: DeskExecutive, now: float, joints: Array) -> None:
         if executive.question is not None and self._thought is None and executive.task is not None:
-            self._thought = self._thinker.submit(executive.task.next, dict(executive.question))
+            self._newest = self._thought = self._thinker.submit(executive.task.next, dict(executive.question))
         if self._thought is not None and self._thought.done():
             thought, self._thought = self._thought, None
             try:
