@@ -167,6 +167,17 @@ def test_a_thought_that_nobody_wants_any_more_is_still_thought(stage: Any, known
     stage.until(lambda: not node.thinking)
 
 
+def test_a_scene_that_is_told_again_is_not_heard_twice(stage: Any, known: Path) -> None:
+    node = stage.add(TabletopNode, camera="", model=str(known))
+    corners = [Point(x=x, y=y) for x, y in ((-0.065, -0.025), (0.065, -0.025), (0.065, 0.025), (-0.065, 0.025))]
+    body = Body(name="eraser", footprint=corners, movable=True, height=0.02)
+    for height in (0.02, 0.03):
+        body.height = height
+        stage.send("/scene", Scene(bodies=[body]), LATCHED)
+        stage.until(lambda height=height: node._hearing._scene and node._hearing._scene.bodies[0].height == height)
+    assert [each.topic for each in node.subscriptions].count("ar_tags/eraser/pose") == 1
+
+
 def test_a_file_that_is_no_model_is_refused(stage: Any, tmp_path: Path) -> None:
     path = tmp_path / "bad.json"
     path.write_text("[1, 2]")

@@ -71,6 +71,7 @@ class DeskHearing:
         self._finder: ItemFinder | None = None
         self._seen: dict[str, Array] = {}
         self._stamps: dict[str, float] = {}
+        self._tag_topics: set[str] = set()
         hear = self._subscribe = diagnostics.subscribe
         hear(String, "robot_description", self._on_description, LATCHED)
         hear(Scene, "scene", self._on_scene, LATCHED, refuses=(BagError,))
@@ -131,8 +132,9 @@ class DeskHearing:
         self._seen, self._stamps = {}, {}
         if not self._camera:
             for body in message.bodies:
-                if body.movable:
-                    topic = f"ar_tags/{body.name}/pose"
+                topic = f"ar_tags/{body.name}/pose"
+                if body.movable and topic not in self._tag_topics:
+                    self._tag_topics.add(topic)
                     self._subscribe(PoseStamped, topic, partial(self._on_pose, body.name), PICTURES)
 
     def _on_frames(self, message: TFMessage) -> None:
