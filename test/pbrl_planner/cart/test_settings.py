@@ -28,6 +28,7 @@ def test_what_is_shipped_stops_in_time_and_plans_as_wide_as_it_drives() -> None:
         ("retry: 2.0", "rettry: 2.0", "retry"),
         ("epsilon: 3.0", "epsilon: 0.5", "epsilon"),
         ("planner:", "[", "settings"),
+        ("local_costmap:", "local_costmap:\n  stale: 0.15", "stale"),  # which nothing ever read
     ],
 )
 def test_a_mistake_is_one_line_that_names_the_key(tmp_path: Path, old: str, new: str, word: str) -> None:

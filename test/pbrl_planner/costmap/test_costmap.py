@@ -264,14 +264,11 @@ def test_a_costmap_over_a_map_covers_it_and_unknown_is_what_is_asked_for() -> No
         assert field.cost(4.5, -6.0) in (0, 253) or unknown == "lethal"
 
 
-def test_a_silent_laser_is_stale_and_one_from_the_future_too() -> None:
-    costmap = Costmap(settings_of(stale=0.15))
-    assert "none has come" in costmap.stale(0.0)
+def test_a_costmap_is_as_old_as_its_last_scan() -> None:
+    costmap = Costmap(settings_of())
+    assert costmap.time == -math.inf
     costmap.observe(scan_of([1.0], time=5.0), (0.0, 0.0, 0.0))
-    assert costmap.stale(5.0) == costmap.stale(5.14) == ""
-    assert "the last is 0.16 s old" in costmap.stale(5.16)
-    assert costmap.stale(4.9)
-    assert costmap.field(5.0).time == 5.0
+    assert costmap.field(7.0).time == 5.0
 
 
 def test_scans_that_come_late_do_not_set_the_clock_back() -> None:

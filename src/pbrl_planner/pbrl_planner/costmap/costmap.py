@@ -121,20 +121,6 @@ class Costmap:
         x, y = self._anchor + self.settings.resolution * np.array(self._corner)
         return float(x), float(y)
 
-    def age(self, now: float) -> float:
-        """Return how old the last scan is [s]; infinite without one, or if it is from the future."""
-        age = now - self.time
-        return age if age >= 0.0 else math.inf
-
-    def stale(self, now: float) -> str:
-        """Return why the costmap is not to be relied upon, in words; empty where it is."""
-        age = self.age(now)
-        if age <= self.settings.stale:
-            return ""
-        if not math.isfinite(age):
-            return "laser: expected scans, none has come yet or its clock is ahead; check its driver and time"
-        return f"laser: expected a scan every {self.settings.stale:g} s, the last is {age:.2f} s old"
-
     def recentre(self, x: float, y: float) -> None:
         """Roll the window so that a place is in its middle cell; what comes in is unknown.
 
@@ -212,7 +198,7 @@ class Costmap:
     def observe_nodding(self, scan: RangeScan, laser: Array, own: Sequence[Array] = ()) -> ScanReport:
         """Take in a scan of a laser that nods: what it sees over the floor is in the way as well.
 
-        Such scans come seldom to any one place: `time`, by which a costmap gets stale, is that of the level laser.
+        Such scans come seldom to any one place: `time`, by which a costmap gets old, is that of the level laser.
 
         Args:
             scan: of a laser that leans any way.

@@ -135,7 +135,6 @@ class CostmapSettings(Section):
         unknown: what becomes of cells that nobody saw: cost 255, 0 or 254.
         unseen: cost at least of cells that are free by the map alone, up to 252: things stand there that no map has, so
             that it is better to go where somebody has looked.
-        stale: [s] after the last scan at which the costmap is not to be relied upon.
         inflation: how cost falls off from obstacles.
         evidence: what is believed of a cell.
         overhang: what is believed of what a nodding laser sees.
@@ -149,7 +148,6 @@ class CostmapSettings(Section):
     own_margin: Annotated[NotNegative, Field(le=0.5)] = 0.03
     unknown: Literal["unknown", "free", "lethal"] = "unknown"
     unseen: Annotated[int, Field(ge=0, le=252)] = 0
-    stale: Positive = 0.15
     inflation: InflationSettings = InflationSettings()
     evidence: EvidenceSettings = EvidenceSettings()
     overhang: OverhangSettings = OverhangSettings()
