@@ -68,14 +68,25 @@ class Pr2Arms:
         Raises:
             ControlError: an arm's joint is missing, or there are not as many positions as names.
         """
-        table = _table(names, positions)
-        missing = [name for name in self._names if name not in table]
-        if missing:
-            raise ControlError(f"joint states: expected both arms' joints, {missing[0]} is missing")
+        table = self._arms_table(names, positions)
         pin.computeJointJacobians(self._model, self._data, self._configuration(table))
         jacobians = np.stack([self._jacobian(k) for k in range(2)])
         joints = np.array([table[name] for name in self._names]).reshape(2, 7)
         return ArmState(jacobians, joints, self._lower, self._upper, self._speed)
+
+    def apart(self, names: Sequence[str], positions: Sequence[float] | Array) -> float:
+        """Return how far from each other the middles between the fingertips are, as seen from above [m].
+
+        Args:
+            names: of the joints whose positions are known.
+            positions: (n,) of them [rad], [m]; other joints are taken at zero.
+
+        Raises:
+            ControlError: an arm's joint is missing, or there are not as many positions as names.
+        """
+        pin.forwardKinematics(self._model, self._data, self._configuration(self._arms_table(names, positions)))
+        left, right = (pin.updateFramePlacement(self._model, self._data, each).translation[:2] for each in self._frames)
+        return float(np.hypot(*(left - right)))
 
     def planar_pose(self, frame: str) -> Array:
         """Return x, y and yaw (3,) in `base` of a frame that no arm moves, with every joint at zero [m, rad].
@@ -104,6 +115,13 @@ class Pr2Arms:
         pin.forwardKinematics(self._model, self._data, self._configuration(table))
         placed = pin.updateFramePlacement(self._model, self._data, self._frame(frame))
         return np.array(placed.homogeneous)
+
+    def _arms_table(self, names: Sequence[str], positions: Sequence[float] | Array) -> dict[str, float]:
+        table = _table(names, positions)
+        missing = [name for name in self._names if name not in table]
+        if missing:
+            raise ControlError(f"joint states: expected both arms' joints, {missing[0]} is missing")
+        return table
 
     def _frame(self, name: str) -> int:
         if not self._model.existFrame(name):

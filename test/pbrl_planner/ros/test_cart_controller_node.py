@@ -137,6 +137,15 @@ def test_a_hand_that_loses_the_cart_ends_the_drive_and_says_which(driving: Drivi
     driving.stage.until(lambda: "right" in driving.status[-1].data)
 
 
+def test_hands_that_come_apart_on_the_cart_end_the_drive(driving: Driving) -> None:
+    results = driving.go(2.0)
+    driving.tick_until(lambda: driving.speed() > 0.2, 60)
+    driving.joints.position[driving.joints.name.index("l_shoulder_pan_joint")] += 0.2
+    driving.tick_until(lambda: results, 20)
+    assert results[0].outcome == Result.GRIP_LOST
+    assert "expected the hands within 0.03 m of where they took hold" in results[0].message
+
+
 def test_it_stops_before_what_is_in_the_way_and_then_gives_up(driving: Driving) -> None:
     results = driving.go(2.0)
     driving.floor.cells[:, 130:134] = LETHAL  # at 3.25 m: 0.6 m before the cart

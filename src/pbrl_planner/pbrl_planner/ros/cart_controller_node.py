@@ -63,12 +63,14 @@ class CartControllerNode(Node):
         compile_kernels(self._settings)  # before anybody can see this node: who sees it may count on its ticks
         self.tracker = CartTracker()
         diagnostics = Diagnostics(self, lambda: self._say.sentence)
-        self._hearing = Hearing(self, diagnostics, self.tracker)
+        self._hearing = Hearing(self, diagnostics, self.tracker, self._take_hands_anew)
         self._arms: Pr2Arms | None = None
         self._joints: JointState | None = None
         self._costs: CostField | None = None
         self._plan: CartPlan | None = None
         self._controller: CartController | None = None
+        self._took: float | None = None
+        """How far apart the hands were when both took hold [m]; None: they do not hold one thing."""
         self._sent = np.zeros(4)
         self._blocked: float | None = None
         self._since: float | None = None
@@ -144,6 +146,7 @@ class CartControllerNode(Node):
     # Ticks
 
     def _tick(self) -> None:
+        misfit = self._misfit()
         clock = self.get_clock().now().nanoseconds * 1e-9
         if self._plan is None or clock == 0.0:  # zero: a simulated clock that nobody has set yet
             return
@@ -152,7 +155,7 @@ class CartControllerNode(Node):
             return
         now = self.tracker.now(clock)
         try:
-            percept = self._percept(now)
+            percept = self._percept(now, misfit)
             if percept is None or self.tracker.body is None:
                 self._wait(now)
                 return
@@ -165,7 +168,24 @@ class CartControllerNode(Node):
         self._send(command)
         self._heed(now, command)
 
-    def _percept(self, now: float) -> CartPercept | None:
+    def _misfit(self) -> float:
+        """Return by how much the hands are not as far apart as when both took hold [m]; NaN: cannot be told."""
+        held = self.tracker.held
+        if len(held) < len(SIDES) or len(set(held.values())) > 1:
+            self._took = None
+        elif self._arms is not None and self._joints is not None:
+            try:
+                apart = self._arms.apart(self._joints.name, self._joints.position)
+            except ControlError:
+                return math.nan  # the drive says so, if there is one
+            self._took = apart if self._took is None else self._took
+            return apart - self._took
+        return math.nan
+
+    def _take_hands_anew(self) -> None:
+        self._took = None
+
+    def _percept(self, now: float, misfit: float) -> CartPercept | None:
         """Return what the controller is given; None: something has never come yet."""
         tracker, pose, costs = self.tracker, self.tracker.pose(now), self._costs
         seen = tracker.sight(now) or tracker.last_sight()
@@ -180,7 +200,7 @@ class CartControllerNode(Node):
             costs.time,
             costs,
             ("left" in tracker.held, "right" in tracker.held),
-            seen.misfit,
+            misfit,
             grip_offset(seen),
             self._arms.state(self._joints.name, self._joints.position),
             up_to(now, seconds(self._joints.header.stamp)),
