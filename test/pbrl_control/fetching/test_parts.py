@@ -44,6 +44,18 @@ def test_late_tags_of_moving_arms_do_not_move_the_base(kinematics: RobotKinemati
     assert np.abs(where.pose(now) - world.base).max() < 2e-3
 
 
+def test_after_a_clock_was_set_back_the_base_is_where_it_is_seen(kinematics: RobotKinematics) -> None:
+    where = Whereabouts(kinematics, LocalizerSettings())
+    for begin, place in ((100.0, [-1.0, 0.5, 0.3]), (1.0, [2.0, -0.5, 1.3])):
+        world = World(kinematics, np.array(place), joints=STOWED.copy())
+        where.take(begin, Percept())  # somebody looks before anything new has come
+        for tick in range(20):
+            world.time = now = begin + 0.05 * tick
+            where.odometry(now, np.zeros(3))
+            where.take(now, world.percept())
+        assert np.abs(where.pose(now) - world.base).max() < 2e-3
+
+
 def test_sightings_are_averaged_and_jumps_are_not(rng: np.random.Generator) -> None:
     around = Surroundings(0.5)
     for k in range(100):
