@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import StrMethodFormatter
+from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from pbrl_bringup.benches.concealed_rows import STRONG, interval, median
 from pbrl_bringup.concealed.draws import DRAWS
@@ -122,7 +122,6 @@ def held_out(scores: Sequence[Score]) -> Figure | None:
     effects = list(dict.fromkeys(each.effects[0] for each in hidden))
     if not effects:
         return None
-    plain = StrMethodFormatter("{x:g}")
     page = Figure(figsize=(7.2, 1.6 + 0.27 * len(effects)), layout="constrained")
     axes = page.subplots()
     for label, colour, marker, field in (
@@ -135,8 +134,9 @@ def held_out(scores: Sequence[Score]) -> Figure | None:
         rows = np.arange(len(effects))
         axes.scatter(1000.0 * np.array(middles), rows, color=colour, marker=marker, s=34, label=label, zorder=3)
     axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(plain)
-    axes.xaxis.set_minor_formatter(plain)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.set_yticks(range(len(effects)), effects, fontsize=8)
     axes.invert_yaxis()
     axes.grid(axis="x", color="0.9")
