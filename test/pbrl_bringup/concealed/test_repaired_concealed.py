@@ -78,7 +78,7 @@ def shown(scene: Scene, force: np.ndarray, heading: float) -> tuple[np.ndarray, 
     The sensor is turned as on the body at `heading`; its reading at rest is taken off, its opposite acts.
     """
     axes = yaw_matrices(np.array([heading]))[0] @ TURN
-    on, sensor = np.zeros(6), wrist_sensor(scene, "left", np.random.default_rng(0))
+    on, sensor = np.zeros(6), wrist_sensor(scene, "left", np.random.default_rng(0), 1e-3)
     on[:3], on[3:] = -axes.T @ [*force[:2], 0.0], -axes.T @ [0.0, 0.0, force[2]]
     stamps, found = [], []
     for k in range(int(4.0 * RATE)):
@@ -152,7 +152,7 @@ def test_what_is_late_acts_when_the_law_says(tmp_path: Path, late: float) -> Non
 
 
 def _left(scene: Scene, rng: np.random.Generator) -> Any:
-    return wrist_sensor(scene, "left", rng)
+    return wrist_sensor(scene, "left", rng, 1e-3)
 
 
 def test_what_is_told_of_a_recording_comes_back_as_what_was_concealed(tmp_path: Path) -> None:

@@ -122,7 +122,8 @@ class MismatchNode(Node):
         if not self._pusher.service_is_ready():
             response.message = "expected somebody who offers /push, a robot or a simulator; nobody does"
             return response
-        since = self.listener.newest()  # a hold that ended before was none of this push
+        # No hold that ends sooner is this push, not even one whose end is still on its way here.
+        ends = self.listener.newest() + float(push["duration"])
         done = await self._pushed(push_to_msg(push))
         if done is None:
             late = f"the push of {push['object']} has not ended within {self._patience:g} s"
@@ -130,7 +131,7 @@ class MismatchNode(Node):
             return response
         response.success, response.message = done.success, done.message
         if done.success:
-            self._watcher.diagnose_again(push["object"], since)
+            self._watcher.diagnose_again(push["object"], ends)
             response.message = f"pushed: {json.dumps(dict(push))}; a new diagnosis of {push['object']} follows"
         return response
 
