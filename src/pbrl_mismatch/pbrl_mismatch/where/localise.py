@@ -207,7 +207,7 @@ def _impulse(stretch: Stretch, when: Sequence[Interval]) -> float:
 
 def _stretch_sentence(where: Localisation, stretch: Stretch, when: Sequence[Interval]) -> str:
     """Return a stretch as a person would say it, with how surely its ends are known."""
-    k = where.found.stretches.index(stretch)
+    k = [each.first for each in where.found.stretches].index(stretch.first)
     begun = where.found.changes[k - 1] if k > 0 else None
     ended = where.found.changes[k] if k < len(where.found.changes) else None
     start = f"{when[0][0]:.1f}" if begun is None else f"{begun.time:.1f} ± {begun.sd:.1f}"
