@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,12 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from concealed_cases import concealed
-from scipy.stats import kstest
 
 from pbrl_bag import read_recording, write_recording
 from pbrl_bag.types import Recording, WrenchStream
 from pbrl_mismatch import DiagnoseOptions, Diagnosis, MismatchError, diagnose, track_of
-from pbrl_mismatch.diagnose import NOTHING_HELD_OUT, least_of_two, with_library
+from pbrl_mismatch.diagnose import NOTHING_HELD_OUT
 from pbrl_mismatch.report import NOTHING_TRIED
 from pbrl_model.errors import ModelError
 
@@ -174,29 +172,6 @@ def test_a_soft_hold_is_named_though_the_motion_does_not_show_it(concealed_recor
     found = one.effects[0].parameters["grip_compliance"]
     give = concealed("grasp_compliance", np.random.default_rng([1, 7]))["give"]
     assert abs(found["mean"] - give) < 3.5 * found["sd"] < give
-
-
-def test_a_law_that_is_known_lowers_the_p_value_and_never_by_more_than_its_odds_allow() -> None:
-    assert with_library(0.5, -math.inf) == pytest.approx(0.525)
-    assert with_library(0.5, 20.0) == pytest.approx(11.0 * math.exp(-20.0))
-    assert with_library(1e-9, 3.0) == pytest.approx(1.1e-9)
-    assert with_library(1.0, 0.0) == 1.0
-    assert with_library(0.3, 1e4) == 0.0
-    # By Markov's inequality odds beyond 1 / a have a chance of a at most: both ways together keep the level.
-    rng = np.random.default_rng(0)
-    shift = rng.standard_normal(20_000)
-    odds = shift * 3.0 - 4.5  # of a law at three standard deviations, where there is none
-    values = np.array([with_library(p, o) for p, o in zip(rng.random(20_000), odds, strict=True)])
-    for level in (0.01, 0.05, 0.2):
-        assert np.mean(values < level) < level
-    # Where the library has nothing to say, p-values stay as even as they were.
-    assert all(abs(with_library(p, -math.inf) - p) < 1 / 39 for p in np.linspace(0.0, 1.0, 50))
-
-
-def test_of_two_tests_the_lesser_p_value_is_as_uniform_as_each() -> None:
-    one, other = np.random.default_rng(1).random((2, 4000))
-    values = [least_of_two(a, b) for a, b in zip(one, other, strict=True)]
-    assert kstest(values, "uniform").pvalue > 0.01
 
 
 def test_bad_input_is_refused_in_one_line(dragged: Recording) -> None:

@@ -19,13 +19,13 @@ from pbrl_mismatch.observability.power import needed
 from pbrl_mismatch.search.grip import (
     CAMERA_SPREAD,
     FREE_PLACE,
-    LASTS,
     NEW_RUBBER,
     NEW_RUBBER_SPREAD,
     POINT_SPREAD,
     SOFT_FORCE,
     grip_evidence,
 )
+from pbrl_mismatch.search.grip_noise import LASTS
 from pbrl_mismatch.search.hypothesis import Hypothesis
 
 DELAY, NOISE = 0.005, 0.002
@@ -81,6 +81,15 @@ def test_a_tag_s_offset_shows_where_the_edge_turns_and_none_is_held_against_it()
         # An offset that is known is better than one that is not, and a wrong one is worse.
         assert with_tag.of_tag(there, 1e-6 * np.eye(3)) > with_tag.of_tag(none, wide)
         assert with_tag.of_tag(-there, 1e-6 * np.eye(3)) < 0.0
+
+
+def test_a_body_that_is_seen_far_from_where_it_is_held_is_a_mismatch_whatever_the_law() -> None:
+    for seed in range(6):
+        grips = readings(np.random.default_rng(seed))
+        told = grip_evidence(grips, DELAY).p_value
+        # Of a centimetre that each grasp may be off nobody is surprised, of five of all of them one is.
+        assert grip_evidence(seen_off(grips, np.array([0.05, -0.04, 0.0])), DELAY).p_value < 1e-3 < told
+        assert grip_evidence(seen_off(grips, np.array([0.004, 0.003, 0.0])), DELAY).p_value > 0.1 * told
 
 
 def test_the_odds_of_a_tag_s_offset_are_those_of_the_gaussian_that_it_is() -> None:

@@ -100,13 +100,16 @@ def test_one_effect_is_named_where_only_what_is_beside_it_is_open(monkeypatch: p
         (("wrench_bias", "unseen_body"), True, 1e-9, 0.2, True),  # so is a contact
         (("wrench_bias", "unseen_body"), True, 1e-9, 0.5, False),  # that leaves half is another thing
         (("unseen_body",), True, 1e-3, 0.5, True),
+        (("unseen_body",), True, 1e-9, 0.35, True),
+        (("floor_patch",), True, 1e-9, 0.35, False),  # a patch has no history that a third could hang on
+        (("floor_patch",), True, 1e-9, 0.2, True),
     ],
 )
 def test_a_law_that_leaves_a_wrench_is_not_named_if_it_is_exact_or_the_wrench_large(
     monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], exact: bool, p_value: float, left: float, named: bool
 ) -> None:
     monkeypatch.setattr(report, "_described", lambda each, scene: each.effects)
-    monkeypatch.setattr(report, "predictive_test", lambda peak, row: SimpleNamespace(p_value=p_value))
+    monkeypatch.setattr(report, "predictive_test", lambda peak, row: SimpleNamespace(p_value=p_value, lasting=1.0))
     fits: Any = SimpleNamespace(usual_scale=1.0, peak=SimpleNamespace(settled=[True]), unexplained=100.0 * left)
     none: Any = SimpleNamespace(usual_scale=1.0, unexplained=100.0)
     weighed = (Weighed(names, fits, 0.0, 1.0, False), Weighed((), none, -50.0, 0.0, False))
@@ -114,3 +117,6 @@ def test_a_law_that_leaves_a_wrench_is_not_named_if_it_is_exact_or_the_wrench_la
     assert found.effects == (names if named else ())
     assert found.alternatives == (() if named else names)
     assert any("leaves a wrench" in note for note in found.notes) != named
+    # It is the same for a wrench that lasts and is too little to be seen among all that there could be.
+    monkeypatch.setattr(report, "predictive_test", lambda peak, row: SimpleNamespace(p_value=0.5, lasting=p_value))
+    assert findings_of(none, weighed, fits, exact=exact).effects == found.effects

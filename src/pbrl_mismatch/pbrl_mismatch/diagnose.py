@@ -38,6 +38,7 @@ from pbrl_mismatch.search.fitted import (
 from pbrl_mismatch.search.grip import beside_motion, grip_evidence
 from pbrl_mismatch.search.heldout import noise_floor
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
+from pbrl_mismatch.search.p_values import least_of_two, with_library
 from pbrl_mismatch.search.posterior import with_draws
 from pbrl_mismatch.search.predictive import Verdict, predictive_test
 from pbrl_mismatch.search.told_baseline import ToldBaseline, told_baselines
@@ -54,8 +55,6 @@ from pbrl_model.verdicts import note_on_unheard
 Array = NDArray[np.float64]
 
 LEAST_FORCE = 1e-9
-LIBRARY_SHARE = 0.1
-"""What the library's odds have of the level of the test, beside the test's own."""
 UNKNOWN_MASS_SPREAD = 1.0
 NOTHING_HELD_OUT = (
     "no push lasts long enough to leave some of it out of the fit: the name rests on the evidence alone, and no "
@@ -250,27 +249,6 @@ def fit_baselines(
         return likeliest_first(pool.map(lambda each: fit_baseline(each[0], track, each[1], stages, options), own))
 
 
-def least_of_two(one: float, other: float) -> float:
-    """Return the p-value of the lesser of two independent ones (Sidak)."""
-    return min(one, other) * (2.0 - min(one, other))
-
-
-def with_library(p_value: float, log_odds: float) -> float:
-    """Return a p-value that the library has a say in.
-
-    The test against any wrench whatever spreads its power; a law that is known has all of it in one place. By Markov's
-    inequality the odds of the library are a test too: under no mismatch they exceed 1 / a with chance a at most. Joined
-    as Sidak's are, with weights: what comes out is as even as what goes in, up to a fortieth, and has no lump at one.
-
-    Args:
-        p_value: of the test against any wrench.
-        log_odds: of any effect of the library against none, at even prior odds.
-    """
-    by_library = math.exp(-max(log_odds, 0.0)) if log_odds < 700.0 else 0.0
-    least = min(p_value, by_library / LIBRARY_SHARE, 1.0)
-    return least * (1.0 + LIBRARY_SHARE * (1.0 - least))
-
-
 def _diagnose_object(
     seed: np.random.SeedSequence,
     track: Track,
@@ -290,7 +268,7 @@ def _diagnose_object(
     explained = explain(second, track, bases, stages, grip, options)
     baseline = judged(explained.bases[0], explained.stages, options, even=True)
     verdict = predictive_test(baseline.peak, 0)
-    p_value = verdict.p_value if grip is None else least_of_two(verdict.p_value, grip.p_value)
+    p_value = verdict.either if grip is None else least_of_two(verdict.either, grip.p_value)
     verdict = replace(verdict, p_value=with_library(p_value, explained.log_odds))
     mismatch = verdict.p_value < options.level
     weighed = held_against(explained, baseline, options) if mismatch else ()

@@ -180,6 +180,11 @@ class Effect:
     exact: bool = False
     limit: str | None = None
 
+    @property
+    def of_history(self) -> bool:
+        """Tell whether what it does follows from all that was before: of contacts, and of what moves besides the body."""
+        return self.remembers or self.touches is not None
+
     def chosen(self, scene: Scene, variant: int) -> tuple[Parameter, ...]:
         """Return the parameters that are free in one variant."""
         known = {parameter.column: parameter for parameter in self.parameters(scene)}

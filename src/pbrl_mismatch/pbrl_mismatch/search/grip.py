@@ -9,10 +9,6 @@ between the plates, by `a`: where the gripper's point is on it is known but for 
 camera may see body and gripper off against each other by b in the world, which turns against the body as its heading
 h does. A tag that is glued on with an offset moves the contact that it makes one see: as the edge turns between the
 plates about the true one, the gripper's point swings about it.
-
-The noise is that of means of poses, and stays like itself as exp(-|t - t'| / tau) does: taken for independent, its slow
-swings would pass for a hold that gives way. tau has the largest restricted likelihood (Patterson and Thompson 1971),
-which counts what the fit has used up.
 """
 
 from __future__ import annotations
@@ -24,15 +20,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
+from scipy.stats import chi2
 
 from pbrl_mismatch.data.grip import GripTrack
 from pbrl_mismatch.effects.grasp_compliance import PARAMETERS
 from pbrl_mismatch.effects.pose_bias import PARAMETERS as TAG_PARAMETERS
 from pbrl_mismatch.kernels.columns import COLUMN
 from pbrl_mismatch.search.fitted import Fitted
+from pbrl_mismatch.search.grip_noise import RANK, GripNoise, grip_noise
 from pbrl_mismatch.search.hypothesis import Hypothesis
 from pbrl_mismatch.search.objective import Reduced
 from pbrl_mismatch.search.one_sided import one_sided
+from pbrl_mismatch.search.p_values import unless_unbelievable
 from pbrl_model.transforms import plane_rotations
 
 Array = NDArray[np.float64]
@@ -46,16 +45,13 @@ SOFT_FORCE = 0.5
 """A force has a direction from about here on [N]."""
 FREE_PLACE, POINT_SPREAD, CAMERA_SPREAD = 0.1, 0.01, 0.01
 """Standard deviations of where a grasp is, which is not known, of the gripper's point and of the camera's error [m]."""
-RANK = 1e-4
-"""Directions of the places that are weaker than this share of the strongest are none."""
 LATE_SPREAD = 0.12
 """Of a delay that is a fault, as in the effect `time_offset` [s]."""
-LEAST_FREE = 8
-"""Numbers that the readings must have beyond what is learned of them, or their noise is not known."""
-LASTS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.9, 1.3, 2.0)
-"""How long the noise may be like itself [s]; none: each reading's is its own."""
-GIVES, PLAYS = 0, 1
-"""Columns of what is learned beside the grasps' places."""
+GIVES, PLAYS, LEARNED = 0, 1, 3
+"""Columns of what is learned beside the grasps' places, and how many there are."""
+SHOWS = 0.1
+"""Where grippers and camera are is told by the readings in directions in which they have so much of what is believed
+to say, as a precision."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +89,8 @@ class GripEvidence:
     Attributes:
         laws: by whether the hold gives way, and whether the body's poses are late against the gripper's.
         p_value: chance of so large a misfit if the hold is as it should be and no stream late; of one with the force,
-            for a hold gives way to no other side.
+            for a hold gives way to no other side. Or of gripper and body so far from where they are told to be, where
+            that is unbelievable.
         spread: (3, 3) covariance of compliance [m/N], play [m] and lateness [s] that the readings find in such a hold.
     """
 
@@ -176,7 +173,7 @@ def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence | None:
     stiff, soft = (NEW_RUBBER_SPREAD, 1e-9), tuple(p.spread for p in PARAMETERS)
     # Noise from the richest law, freed of all of them: a hold that gives is no worse sensor.
     every = np.column_stack([places, laws])
-    noise = _noise(grips, every, seen)
+    noise = grip_noise(grips, every, seen)
     if noise is None:
         return None
     laws, places, seen, tag = (noise.whitened(each) for each in (laws, places, seen, _tag_law(grips)))
@@ -201,7 +198,9 @@ def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence | None:
     usual = np.array([*stiff, delay_spread])
     mean, wide = _least_squares(laws, places, shifted, usual, noise)
     # No hold gives way against the force: what looks like that is chance, and is no alarm.
-    return GripEvidence(found, one_sided(mean, wide, noise.count), wide)
+    p_value = one_sided(mean, wide, noise.count)
+    prior = np.concatenate([known, usual])
+    return GripEvidence(found, unless_unbelievable(p_value, _misplaced(design, shifted, variance, prior)), wide)
 
 
 def _laws(grips: GripTrack) -> tuple[Array, Array, Array]:
@@ -230,58 +229,7 @@ def _place_spread(columns: int) -> Array:
     return np.concatenate([np.full(grasps, FREE_PLACE), np.full(grasps, POINT_SPREAD), np.full(2, CAMERA_SPREAD)])
 
 
-@dataclass(frozen=True)
-class _Noise:
-    """Noise that is like itself for a while, and how likely it is.
-
-    Attributes:
-        kept: (N,) share of its last reading's noise that a reading has, 0 for the first of a grasp.
-        likelihood: log of its restricted likelihood [nat], up to a common constant.
-        rest: sum of squares that the richest law leaves, whitened [m^2].
-        count: degrees of freedom of those.
-    """
-
-    kept: Array
-    likelihood: float
-    rest: float
-    count: int
-
-    def whitened(self, rows: Array) -> Array:
-        """Return rows (2 N, ...) whose noise is independent."""
-        return _whitened(self.kept, rows)
-
-
-def _noise(grips: GripTrack, every: Array, seen: Array) -> _Noise | None:
-    """Find the noise beside the richest law (2 N, K) of what was seen (2 N,); None where too little is left to see."""
-    own, size, _ = np.linalg.svd(every, full_matrices=False)
-    own = own[:, size > RANK * size[0]]
-    gap, same = np.abs(np.diff(grips.time)), np.diff(grips.grasp) == 0
-    count = len(seen) - own.shape[1]
-    if count < LEAST_FREE:
-        return None
-
-    def lasting(tau: float) -> _Noise:
-        kept = np.concatenate([[0.0], np.exp(-gap / tau) * same if tau > 0.0 else 0.0 * gap])
-        basis, corner = np.linalg.qr(_whitened(kept, own))
-        white = _whitened(kept, seen)
-        left = white - basis @ (basis.T @ white)
-        rest = float(left @ left)
-        # Both axes have the same correlation: the root of its determinant is one axis's whole.
-        likelihood = -float(np.sum(np.log1p(-(kept**2)))) - float(np.sum(np.log(np.abs(np.diag(corner)))))
-        return _Noise(kept, likelihood - 0.5 * count * math.log(rest), rest, count)
-
-    return max(map(lasting, LASTS), key=lambda each: each.likelihood)
-
-
-def _whitened(kept: Array, rows: Array) -> Array:
-    """Return rows (2 N, ...) less what they keep (N,) of those before, at one size."""
-    pairs = rows.reshape(len(kept), -1)
-    own = np.sqrt(1.0 - kept**2)
-    white = (pairs - kept[:, None] * np.roll(pairs, 1, axis=0)) / own[:, None]
-    return np.asarray(white.reshape(rows.shape), dtype=np.float64)
-
-
-def _least_squares(laws: Array, places: Array, seen: Array, usual: Array, noise: _Noise) -> tuple[Array, Array]:
+def _least_squares(laws: Array, places: Array, seen: Array, usual: Array, noise: GripNoise) -> tuple[Array, Array]:
     """Return what the laws explain beyond the grasps' places (3,), and its covariance if all is as usual (3, 3)."""
     own, size, _ = np.linalg.svd(places, full_matrices=False)
     own = own[:, size > RANK * size[0]]
@@ -289,6 +237,35 @@ def _least_squares(laws: Array, places: Array, seen: Array, usual: Array, noise:
     mean, _, _, _ = np.linalg.lstsq(free, seen - own @ (own.T @ seen), rcond=None)
     covariance = noise.rest / noise.count * np.linalg.pinv(free.T @ free) + np.diag(usual**2)
     return np.asarray(mean, dtype=np.float64), np.asarray(covariance, dtype=np.float64)
+
+
+def _misplaced(design: Array, seen: Array, variance: float, prior: Array) -> float:
+    """Return the chance that grippers' points and camera are so far from where they are told to be (chi-square).
+
+    A tag that is glued on with an offset moves every contact alike, a gripper's frame that is told wrongly its point:
+    both show as errors of the places that nobody would believe, whether or not a law of the library has them.
+
+    Args:
+        design: (2 N, K) of the grasps' places and of what is learned, whitened.
+        seen: (2 N,).
+        variance: of the whitened noise [m^2].
+        prior: (K,) standard deviations.
+    """
+    told = prior < FREE_PLACE
+    told[-LEARNED:] = False
+    other = ~told
+    precision, pull = design.T @ design / variance, design.T @ seen / variance
+    gain = np.linalg.solve(
+        precision[np.ix_(other, other)] + np.diag(prior[other] ** -2.0), precision[np.ix_(other, told)]
+    )
+    root = np.diag(prior[told])
+    # In deviations of what is believed; others are put in at their best.
+    information = root @ (precision[np.ix_(told, told)] - precision[np.ix_(told, other)] @ gain) @ root
+    off = root @ (pull[told] - gain.T @ pull[other])
+    size, axes = np.linalg.eigh(information)
+    shown = size > SHOWS
+    statistic = float(np.sum((axes.T @ off)[shown] ** 2 / (size * (1.0 + size))[shown]))
+    return float(chi2.sf(statistic, int(shown.sum()))) if shown.any() else 1.0
 
 
 def beside_motion(fitted: Fitted, grip: GripEvidence | None) -> Fitted:

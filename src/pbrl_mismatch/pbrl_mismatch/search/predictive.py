@@ -12,10 +12,14 @@ blunt and its p-values too high.
 
 What the wrench would do in the model is no measure: a wheel that holds a body where a pin let it go would hold it
 against the wrench as well, and the whole misfit would pass for noise.
+
+Of the D numbers some twenty are what wrenches that last would do (`lasting.py`), the others what only fleeting ones
+could: two tests of which the first is the sharper by far for what goes on for long.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,11 +27,13 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
-from pbrl_mismatch.data.cuts import Cuts
+from pbrl_mismatch.data.cuts import Cuts, Index
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.search.climb import Peak
 from pbrl_mismatch.search.hypothesis import BELIEVED
+from pbrl_mismatch.search.lasting import lasting_wrenches
 from pbrl_mismatch.search.objective import START, WRENCH
+from pbrl_mismatch.search.p_values import least_of_two, unless_unbelievable
 
 Array = NDArray[np.float64]
 
@@ -37,9 +43,11 @@ TELLING = 0.05
 """A direction that one newton moves by less than this many standard deviations tells nothing."""
 FLOORS = (1.0, 0.6, 0.3, 0.1, 0.03)
 """Shares of the sensor's own error that the windows are asked for; the likeliest counts, none is larger than told."""
-
-UNBELIEVABLE = 1e-3
-"""A conflict with that knowledge counts from here on; above, it leaves the p-value as the motion has it."""
+ENDURES = 0.03
+"""Of the size of a sensor's own error so much may last through a recording in every way: no law of a wheel and no axis
+of a sensor is right to a hundredth of a newton, which a minute tells."""
+OWN, ALIKE = 0.05, 0.02
+"""Of a lasting wrench the model's own parameters leave at least this share; and less of it than this is another's."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +55,14 @@ class Verdict:
     """What the test says.
 
     Attributes:
-        p_value: chance of so large a misfit if the model were right.
+        p_value: chance of so large a misfit if the model were right, of any wrench whatever.
         statistic: F.
         explained: D, numbers that a left-out wrench would explain.
         rest: R, numbers that are noise either way.
         noise_scale: root of the mean square of the rest: noise over what was thought.
+        lasting: the chance where wrenches that last are looked for.
+        fleeting: where those that do not.
+        conflict: chance that what is believed of mass, inertia and delay is so far off.
     """
 
     p_value: float
@@ -59,6 +70,14 @@ class Verdict:
     explained: int
     rest: int
     noise_scale: float
+    lasting: float = 1.0
+    fleeting: float = 1.0
+    conflict: float = 1.0
+
+    @property
+    def either(self) -> float:
+        """Return the chance of so large a misfit to wrenches that last or to others."""
+        return unless_unbelievable(least_of_two(self.lasting, self.fleeting), self.conflict)
 
 
 def belief_conflict(peak: Peak, row: int) -> float:
@@ -92,6 +111,12 @@ def pushed(cuts: Cuts, mass: float) -> Array:
     return np.asarray(moved.reshape(len(cuts), -1, 3 * KNOTS))
 
 
+def knots(cuts: Cuts) -> Index:
+    """Return the steps (W, KNOTS) of a track at which windows have their knots."""
+    share = np.linspace(0.0, 1.0, KNOTS)
+    return np.minimum(cuts.span[:, :1] + np.rint(cuts.span[:, 1:2] * share).astype(np.int64), cuts.span[:, 3:])
+
+
 def predictive_test(peak: Peak, row: int) -> Verdict:
     """Test a fitted model on the windows of its objective.
 
@@ -104,36 +129,45 @@ def predictive_test(peak: Peak, row: int) -> Verdict:
     u, z = peak.coordinates[row : row + 1], peak.nuisance[row : row + 1]
     linear = objective.linearise(u, z)
     push = pushed(cuts, float(objective.hypothesis.rows(u)[0, at.MASS]))
+    steps = knots(cuts)
+    lasting = ENDURES * objective.floor * lasting_wrenches(cuts, steps).reshape(len(cuts), push.shape[-1], -1)
     windows = []
     for w in range(len(cuts)):
         seen = cuts.weight[w].reshape(-1) > 0.0
         spread = linear.spread[0, w][seen]
         # The residual that would be left with no nuisance, to first order; its covariance is I + S S^T.
         centred = linear.residual[0, w][seen] + spread @ z[0, w]
-        windows.append(_Window(centred, linear.slope[0, w][seen], spread, push[w][seen]))
+        windows.append(_Window(centred, linear.slope[0, w][seen], spread, push[w][seen], lasting[w]))
     white = max((_whiten(windows, share) for share in FLOORS), key=lambda each: each.log_likelihood)
-    verdict = _split(white)
-    conflict = belief_conflict(peak, row)
-    return replace(verdict, p_value=min(verdict.p_value, conflict)) if conflict < UNBELIEVABLE else verdict
+    verdict, conflict = _split(white), belief_conflict(peak, row)
+    return replace(verdict, p_value=unless_unbelievable(verdict.p_value, conflict), conflict=conflict)
 
 
 @dataclass(frozen=True)
 class _Window:
-    """One window: residual (R,), and slopes in parameters (R, K), nuisances (R, NUISANCES) and knots (R, 3 KNOTS)."""
+    """One window: residual (R,), and slopes in parameters (R, K), nuisances (R, NUISANCES) and knots (R, 3 KNOTS).
+
+    Of lasting wrenches there is what each is at the knots (3 KNOTS, L), as large as it may be in any recording.
+    """
 
     residual: Array
     slope: Array
     spread: Array
     push: Array
+    lasting: Array
 
 
 @dataclass(frozen=True)
 class _White:
-    """All windows, whitened: residual (R,) and own slopes (R, M) as an orthonormal basis, what knots do by window."""
+    """All windows, whitened: residual (R,) and own slopes (R, M) as an orthonormal basis, what knots do by window.
+
+    What lasting wrenches do (R, L) is beside them.
+    """
 
     residual: Array
     own: Array
     pushes: list[Array]
+    lasting: Array
     log_det: float
 
     @property
@@ -150,7 +184,7 @@ class _White:
 
 def _whiten(windows: list[_Window], share: float) -> _White:
     """Whiten windows whose sensor has this share of its floor."""
-    residual, slopes, pushes, log_det = [], [], [], 0.0
+    residual, slopes, pushes, lasting, log_det = [], [], [], [], 0.0
     scale = np.array([1.0] * START + [share] * WRENCH)
     for each in windows:
         spread = each.spread * scale
@@ -159,12 +193,14 @@ def _whiten(windows: list[_Window], share: float) -> _White:
         whiten = np.linalg.inv(factor)
         residual.append(whiten @ each.residual)
         slopes.append(whiten @ each.slope)
-        left, size, _ = np.linalg.svd(whiten @ each.push, full_matrices=False)
+        push = whiten @ each.push
+        left, size, _ = np.linalg.svd(push, full_matrices=False)
         pushes.append(left[:, size > TELLING])
+        lasting.append(push @ each.lasting)
     slope = np.concatenate(slopes)
     norms = np.linalg.norm(slope, axis=0)
     own, strength, _ = np.linalg.svd(slope[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
-    return _White(np.concatenate(residual), own[:, strength > 1e-6], pushes, log_det)
+    return _White(np.concatenate(residual), own[:, strength > 1e-6], pushes, np.concatenate(lasting), log_det)
 
 
 def _split(white: _White) -> Verdict:
@@ -177,12 +213,37 @@ def _split(white: _White) -> Verdict:
         row, column = row + len(each), column + each.shape[1]
     basis, upper = np.linalg.qr(basis - own @ (own.T @ basis))
     basis = basis[:, np.abs(np.diag(upper)) > 1e-8]
-    explained = basis @ (basis.T @ free)
-    rest = free - explained
+    explained = basis.T @ free
     d = basis.shape[1]
     r = max(len(free) - d - own.shape[1], 1)
+    noise = float(np.sum((free - basis @ explained) ** 2)) / r
     if d == 0:
-        return Verdict(1.0, 0.0, 0, r, float(np.sqrt(np.sum(rest**2) / r)))
-    statistic = float(np.sum(explained**2) / d / max(np.sum(rest**2) / r, 1e-12))
-    p_value = float(f_distribution.sf(statistic, d, r))
-    return Verdict(p_value, statistic, d, r, float(np.sqrt(np.sum(rest**2) / r)))
+        return Verdict(1.0, 0.0, 0, r, math.sqrt(noise))
+    squares, least = float(np.sum(explained**2)), max(noise, 1e-12)
+    inside, usual = _lasting(white, basis)
+    last = inside.T @ explained
+    enduring = float(last @ np.linalg.solve(least * np.eye(len(last)) + usual, last))
+
+    def chance(squares: float, count: int) -> float:
+        return float(f_distribution.sf(max(squares, 0.0) / count, count, r)) if count else 1.0
+
+    return Verdict(
+        chance(squares / least, d),
+        squares / d / least,
+        d,
+        r,
+        math.sqrt(noise),
+        chance(enduring, len(last)),
+        chance((squares - float(last @ last)) / least, d - len(last)),
+    )
+
+
+def _lasting(white: _White, basis: Array) -> tuple[Array, Array]:
+    """Return what lasting wrenches do: a basis (D, L') within one (R, D) of any, and their usual covariance in it."""
+    whole = np.linalg.norm(white.lasting, axis=0)
+    lasting = basis.T @ white.lasting
+    free = np.linalg.norm(lasting, axis=0) > OWN * whole
+    left, size, _ = np.linalg.svd(lasting[:, free] / whole[free], full_matrices=False)
+    inside = np.asarray(left[:, size > ALIKE])
+    usual = inside.T @ lasting
+    return inside, np.asarray(usual @ usual.T)

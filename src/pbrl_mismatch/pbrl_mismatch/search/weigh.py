@@ -113,7 +113,7 @@ def _discrepancy(effect: Effect) -> float:
     """Return the share of what an effect explains that its law may leave for others."""
     if effect.exact:
         return OF_EXACT
-    return OF_HISTORY if effect.remembers or effect.touches is not None else DISCREPANCY
+    return OF_HISTORY if effect.of_history else DISCREPANCY
 
 
 def _unexplained(sets: Iterable[Fitted]) -> float:

@@ -51,7 +51,12 @@ class Feature:
 
 def features_of(samples: Samples) -> tuple[Feature, ...]:
     """Return all features at the samples."""
-    return (*_constant(samples), *_resisting(samples), *_inertial(samples), *_placed(samples), *_timed(samples))
+    return (*steady(samples), *_inertial(samples), *_placed(samples), *_timed(samples))
+
+
+def steady(samples: Samples) -> tuple[Feature, ...]:
+    """Return what is constant in a frame, or resists, all the time."""
+    return (*_constant(samples), *_resisting(samples))
 
 
 def _force(*columns: Array) -> Array:

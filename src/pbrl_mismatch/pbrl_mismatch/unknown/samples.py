@@ -6,7 +6,7 @@ through the same smoother (`refined` of `regression.py`), so that what the smoot
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,17 +74,22 @@ class Samples:
 
 def samples_of(track: Track, residual: ResidualWrench) -> Samples:
     """Return every moment of a residual wrench."""
-    rows, state = np.arange(len(residual.time)), residual.state
+    return replace(moved(track, residual.state), wrench=residual.world, covariance=residual.covariance)
+
+
+def moved(track: Track, state: Array) -> Samples:
+    """Return every moment of a track whose body was at states (T, 6), with no wrench beside."""
+    rows = np.arange(len(state))
     ahead, behind = _neighbours(track, rows)
     return Samples(
-        residual.time,
+        track.clock,
         state[:, :2],
         state[:, 2],
         state[:, 3:5],
         state[:, 5],
         (state[ahead, 3:] - state[behind, 3:]) / np.maximum((ahead - behind) * track.dt, track.dt)[:, None],
-        residual.world,
-        residual.covariance,
+        np.zeros((len(state), 3)),
+        np.zeros((len(state), 3, 3)),
         track.gyration,
     )
 
