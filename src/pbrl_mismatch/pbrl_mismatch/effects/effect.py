@@ -182,7 +182,7 @@ class Effect:
 
     @property
     def of_history(self) -> bool:
-        """Tell whether what it does follows from all that was before: of contacts, and of what moves besides the body."""
+        """Tell whether what it does follows from all that was before: of contacts and what moves besides the body."""
         return self.remembers or self.touches is not None
 
     def chosen(self, scene: Scene, variant: int) -> tuple[Parameter, ...]:
