@@ -172,6 +172,10 @@ def test_a_soft_hold_is_named_though_the_motion_does_not_show_it(concealed_recor
     found = one.effects[0].parameters["grip_compliance"]
     give = concealed("grasp_compliance", np.random.default_rng([1, 7]))["give"]
     assert abs(found["mean"] - give) < 3.5 * found["sd"] < give
+    assert not any("not seen as one that holds" in note for note in one.notes)
+    without = without_all_but("floor_slope", "viscous_drag")
+    one = diagnose(recording, DiagnoseOptions(without=without, baseline=("free",), **QUICK)).objects["table"]
+    assert one.unknown and any("not seen as one that holds" in note for note in one.notes)
 
 
 def test_bad_input_is_refused_in_one_line(dragged: Recording) -> None:

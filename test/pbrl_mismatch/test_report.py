@@ -92,26 +92,36 @@ def test_one_effect_is_named_where_only_what_is_beside_it_is_open(monkeypatch: p
 
 
 @pytest.mark.parametrize(
-    ("names", "exact", "p_value", "left", "named"),
+    ("names", "exact", "p_value", "left", "forecast", "named"),
     [
-        (("wrench_bias",), True, 1e-9, 0.0, False),
-        (("wrench_bias",), True, 1e-3, 0.5, True),
-        (("wrench_bias",), False, 1e-9, 0.5, True),  # a told baseline's casters are an idealisation
-        (("wrench_bias", "unseen_body"), True, 1e-9, 0.2, True),  # so is a contact
-        (("wrench_bias", "unseen_body"), True, 1e-9, 0.5, False),  # that leaves half is another thing
-        (("unseen_body",), True, 1e-3, 0.5, True),
-        (("unseen_body",), True, 1e-9, 0.35, True),
-        (("floor_patch",), True, 1e-9, 0.35, False),  # a patch has no history that a third could hang on
-        (("floor_patch",), True, 1e-9, 0.2, True),
+        (("wrench_bias",), True, 1e-9, 0.0, 0.05, False),
+        (("wrench_bias",), True, 1e-3, 0.5, 0.5, True),
+        (("wrench_bias",), False, 1e-9, 0.5, 0.5, True),  # a told baseline's casters are an idealisation
+        (("wrench_bias", "unseen_body"), True, 1e-9, 0.2, 0.5, True),  # so is a contact
+        (("wrench_bias", "unseen_body"), True, 1e-9, 0.5, 0.5, False),  # that leaves half is another thing
+        (("wrench_bias", "unseen_body"), True, 1e-9, 0.5, 0.05, True),  # but where it says where the body will be
+        (("unseen_body",), True, 1e-3, 0.5, 0.5, True),
+        (("unseen_body",), True, 1e-9, 0.35, 0.5, True),
+        (("floor_patch",), True, 1e-9, 0.35, 0.5, False),  # a patch has no history that a third could hang on
+        (("floor_patch",), True, 1e-9, 0.2, 0.5, True),
     ],
 )
 def test_a_law_that_leaves_a_wrench_is_not_named_if_it_is_exact_or_the_wrench_large(
-    monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], exact: bool, p_value: float, left: float, named: bool
+    monkeypatch: pytest.MonkeyPatch,
+    names: tuple[str, ...],
+    exact: bool,
+    p_value: float,
+    left: float,
+    forecast: float,
+    named: bool,
 ) -> None:
     monkeypatch.setattr(report, "_described", lambda each, scene: each.effects)
     monkeypatch.setattr(report, "predictive_test", lambda peak, row: SimpleNamespace(p_value=p_value, lasting=1.0))
-    fits: Any = SimpleNamespace(usual_scale=1.0, peak=SimpleNamespace(settled=[True]), unexplained=100.0 * left)
-    none: Any = SimpleNamespace(usual_scale=1.0, unexplained=100.0)
+    settled, score, before = (
+        SimpleNamespace(**each) for each in ({"settled": [True]}, {"rmse_position": forecast}, {"rmse_position": 1.0})
+    )
+    fits: Any = SimpleNamespace(usual_scale=1.0, peak=settled, unexplained=100.0 * left, score=score)
+    none: Any = SimpleNamespace(usual_scale=1.0, unexplained=100.0, score=before)
     weighed = (Weighed(names, fits, 0.0, 1.0, False), Weighed((), none, -50.0, 0.0, False))
     found = findings_of(none, weighed, fits, exact=exact)
     assert found.effects == (names if named else ())

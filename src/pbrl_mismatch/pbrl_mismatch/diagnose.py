@@ -23,7 +23,7 @@ from pbrl_mismatch.next_experiment.candidates import Reach
 from pbrl_mismatch.next_experiment.experiment import NextExperiment, next_experiment
 from pbrl_mismatch.observability.detectable import could_not_show
 from pbrl_mismatch.options import DiagnoseOptions
-from pbrl_mismatch.report import Finding, findings_of, held_out_report, sentence
+from pbrl_mismatch.report import Finding, findings_of, held_otherwise, held_out_report, sentence
 from pbrl_mismatch.search.explain import explain, held_against
 from pbrl_mismatch.search.fitted import (
     Fitted,
@@ -35,10 +35,10 @@ from pbrl_mismatch.search.fitted import (
     likeliest_first,
     scene_of,
 )
-from pbrl_mismatch.search.grip import beside_motion, grip_evidence
+from pbrl_mismatch.search.grip import BETWEEN, beside_motion, grip_evidence
 from pbrl_mismatch.search.heldout import noise_floor
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
-from pbrl_mismatch.search.p_values import least_of_two, with_library
+from pbrl_mismatch.search.p_values import UNBELIEVABLE, least_of_two, with_library
 from pbrl_mismatch.search.posterior import with_draws
 from pbrl_mismatch.search.predictive import Verdict, predictive_test
 from pbrl_mismatch.search.told_baseline import ToldBaseline, told_baselines
@@ -268,7 +268,8 @@ def _diagnose_object(
     explained = explain(second, track, bases, stages, grip, options)
     baseline = judged(explained.bases[0], explained.stages, options, even=True)
     verdict = predictive_test(baseline.peak, 0)
-    p_value = verdict.either if grip is None else least_of_two(verdict.either, grip.p_value)
+    held = 1.0 if grip is None else grip.p_value
+    p_value = verdict.either if grip is None else least_of_two(verdict.either, held)
     verdict = replace(verdict, p_value=with_library(p_value, explained.log_odds))
     mismatch = verdict.p_value < options.level
     weighed = held_against(explained, baseline, options) if mismatch else ()
@@ -298,6 +299,8 @@ def _diagnose_object(
     notes += note_on_unheard(track.unheard)
     if found.effects and baseline.score is None:
         notes.append(NOTHING_HELD_OUT)
+    if mismatch and held < UNBELIEVABLE and not set(BETWEEN) & set(named.hypothesis.effects):
+        notes.append(held_otherwise(held))
     if mismatch and not found.effects:
         try:
             report["unknown_description"] = describe_unknown(rng, track, residual, baseline.row).to_report()

@@ -36,7 +36,7 @@ from pbrl_model.transforms import plane_rotations
 
 Array = NDArray[np.float64]
 
-GRASP_COMPLIANCE, LATENESS, TAG_OFFSET = "grasp_compliance", "time_offset", "pose_bias"
+BETWEEN = GRASP_COMPLIANCE, LATENESS, TAG_OFFSET = "grasp_compliance", "time_offset", "pose_bias"
 """Effects that show between gripper and body."""
 TAG = tuple(parameter.column for parameter in TAG_PARAMETERS)
 NEW_RUBBER, NEW_RUBBER_SPREAD = 5e-5, 3e-5

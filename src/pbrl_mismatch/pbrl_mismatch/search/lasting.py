@@ -43,6 +43,27 @@ def lasting_wrenches(cuts: Cuts, steps: Index) -> Array:
     return np.asarray((found / np.where(size > 0.0, size, 1.0)).reshape(*steps.shape, 3, -1))
 
 
+def zero_errors(cuts: Cuts, steps: Index) -> Array:
+    """Return what an error of the sensor's zero is in each hold, of its force along two axes and of its torque.
+
+    Args:
+        cuts: W windows of a track of H holds, before each of which the sensor was read at rest.
+        steps: (W, k) of the track.
+
+    Returns:
+        (W, k, 3, 3 H) as those of `lasting_wrenches`, for one newton, and one newton at the radius of gyration.
+    """
+    track = cuts.track
+    cosine, sine, x, y = (track.mount[steps, k] for k in range(4))
+    one, none = np.ones(steps.shape), np.zeros(steps.shape)
+    along = np.stack([cosine, sine, (x * sine - y * cosine) / track.gyration], -1)
+    across = np.stack([-sine, cosine, (x * cosine + y * sine) / track.gyration], -1)
+    zero = np.stack([along, across, np.stack([none, none, one], -1)], -1)
+    hold = np.searchsorted(track.begin, cuts.span[:, 2], side="right") - 1
+    own = (hold[:, None] == np.arange(len(track.begin))).astype(float)
+    return np.asarray(np.einsum("wkij,wh->wkihj", zero, own).reshape(*steps.shape, 3, -1))
+
+
 def _inertial(samples: Samples) -> Iterator[Array]:
     """Give (N, 3, k) of a mass that comes on, and of a centre of mass that is off by (x, y) in the body."""
     along, turning = samples.acceleration[:, :2], samples.acceleration[:, 2]

@@ -31,7 +31,7 @@ from pbrl_mismatch.data.cuts import Cuts, Index
 from pbrl_mismatch.kernels import places as at
 from pbrl_mismatch.search.climb import Peak
 from pbrl_mismatch.search.hypothesis import BELIEVED
-from pbrl_mismatch.search.lasting import lasting_wrenches
+from pbrl_mismatch.search.lasting import lasting_wrenches, zero_errors
 from pbrl_mismatch.search.objective import START, WRENCH
 from pbrl_mismatch.search.p_values import least_of_two, unless_unbelievable
 
@@ -43,9 +43,9 @@ TELLING = 0.05
 """A direction that one newton moves by less than this many standard deviations tells nothing."""
 FLOORS = (1.0, 0.6, 0.3, 0.1, 0.03)
 """Shares of the sensor's own error that the windows are asked for; the likeliest counts, none is larger than told."""
-ENDURES = 0.03
+ENDURES, ZERO = 0.02, 0.07
 """Of the size of a sensor's own error so much may last through a recording in every way: no law of a wheel and no axis
-of a sensor is right to a hundredth of a newton, which a minute tells."""
+of a sensor is right to a few millinewtons, which a minute tells. And so much its zero may be off in each hold."""
 OWN, ALIKE = 0.05, 0.02
 """Of a lasting wrench the model's own parameters leave at least this share; and less of it than this is another's."""
 
@@ -130,14 +130,15 @@ def predictive_test(peak: Peak, row: int) -> Verdict:
     linear = objective.linearise(u, z)
     push = pushed(cuts, float(objective.hypothesis.rows(u)[0, at.MASS]))
     steps = knots(cuts)
-    lasting = ENDURES * objective.floor * lasting_wrenches(cuts, steps).reshape(len(cuts), push.shape[-1], -1)
+    usual = (ENDURES * lasting_wrenches(cuts, steps), ZERO * zero_errors(cuts, steps))
+    lasting, zero = (objective.floor * each.reshape(len(cuts), push.shape[-1], -1) for each in usual)
     windows = []
     for w in range(len(cuts)):
         seen = cuts.weight[w].reshape(-1) > 0.0
         spread = linear.spread[0, w][seen]
         # The residual that would be left with no nuisance, to first order; its covariance is I + S S^T.
         centred = linear.residual[0, w][seen] + spread @ z[0, w]
-        windows.append(_Window(centred, linear.slope[0, w][seen], spread, push[w][seen], lasting[w]))
+        windows.append(_Window(centred, linear.slope[0, w][seen], spread, push[w][seen], lasting[w], zero[w]))
     white = max((_whiten(windows, share) for share in FLOORS), key=lambda each: each.log_likelihood)
     verdict, conflict = _split(white), belief_conflict(peak, row)
     return replace(verdict, p_value=unless_unbelievable(verdict.p_value, conflict), conflict=conflict)
@@ -147,7 +148,8 @@ def predictive_test(peak: Peak, row: int) -> Verdict:
 class _Window:
     """One window: residual (R,), and slopes in parameters (R, K), nuisances (R, NUISANCES) and knots (R, 3 KNOTS).
 
-    Of lasting wrenches there is what each is at the knots (3 KNOTS, L), as large as it may be in any recording.
+    Of lasting wrenches and of errors of the sensor's zero there is what each is at the knots (3 KNOTS, L), as large as
+    it may be in any recording.
     """
 
     residual: Array
@@ -155,19 +157,21 @@ class _Window:
     spread: Array
     push: Array
     lasting: Array
+    zero: Array
 
 
 @dataclass(frozen=True)
 class _White:
     """All windows, whitened: residual (R,) and own slopes (R, M) as an orthonormal basis, what knots do by window.
 
-    What lasting wrenches do (R, L) is beside them.
+    What lasting wrenches and errors of the sensor's zero do (R, L) is beside them.
     """
 
     residual: Array
     own: Array
     pushes: list[Array]
     lasting: Array
+    zero: Array
     log_det: float
 
     @property
@@ -184,7 +188,7 @@ class _White:
 
 def _whiten(windows: list[_Window], share: float) -> _White:
     """Whiten windows whose sensor has this share of its floor."""
-    residual, slopes, pushes, lasting, log_det = [], [], [], [], 0.0
+    residual, slopes, pushes, lasting, zero, log_det = [], [], [], [], [], 0.0
     scale = np.array([1.0] * START + [share] * WRENCH)
     for each in windows:
         spread = each.spread * scale
@@ -197,10 +201,12 @@ def _whiten(windows: list[_Window], share: float) -> _White:
         left, size, _ = np.linalg.svd(push, full_matrices=False)
         pushes.append(left[:, size > TELLING])
         lasting.append(push @ each.lasting)
+        zero.append(push @ each.zero)
     slope = np.concatenate(slopes)
     norms = np.linalg.norm(slope, axis=0)
     own, strength, _ = np.linalg.svd(slope[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
-    return _White(np.concatenate(residual), own[:, strength > 1e-6], pushes, np.concatenate(lasting), log_det)
+    own = own[:, strength > 1e-6]
+    return _White(np.concatenate(residual), own, pushes, np.concatenate(lasting), np.concatenate(zero), log_det)
 
 
 def _split(white: _White) -> Verdict:
@@ -245,5 +251,5 @@ def _lasting(white: _White, basis: Array) -> tuple[Array, Array]:
     free = np.linalg.norm(lasting, axis=0) > OWN * whole
     left, size, _ = np.linalg.svd(lasting[:, free] / whole[free], full_matrices=False)
     inside = np.asarray(left[:, size > ALIKE])
-    usual = inside.T @ lasting
+    usual = inside.T @ np.column_stack([lasting, basis.T @ white.zero])
     return inside, np.asarray(usual @ usual.T)
