@@ -94,7 +94,8 @@ def test_one_effect_is_named_where_only_what_is_beside_it_is_open(monkeypatch: p
 @pytest.mark.parametrize(
     ("names", "exact", "p_value", "left", "forecast", "named"),
     [
-        (("wrench_bias",), True, 1e-9, 0.0, 0.05, False),
+        (("wrench_bias",), True, 1e-9, 0.0, 0.5, False),
+        (("wrench_bias",), True, 1e-9, 0.0, 0.05, True),  # a forecast as good as that is no chance
         (("wrench_bias",), True, 1e-3, 0.5, 0.5, True),
         (("wrench_bias",), False, 1e-9, 0.5, 0.5, True),  # a told baseline's casters are an idealisation
         (("wrench_bias", "unseen_body"), True, 1e-9, 0.2, 0.5, True),  # so is a contact
@@ -126,7 +127,8 @@ def test_a_law_that_leaves_a_wrench_is_not_named_if_it_is_exact_or_the_wrench_la
     found = findings_of(none, weighed, fits, exact=exact)
     assert found.effects == (names if named else ())
     assert found.alternatives == (() if named else names)
-    assert any("leaves a wrench" in note for note in found.notes) != named
+    assert any("reaches the noise floor" in note for note in found.notes) != named
+    assert any("there is more" in note for note in found.notes) == (named and forecast < 0.1)
     # It is the same for a wrench that lasts and is too little to be seen among all that there could be.
     monkeypatch.setattr(report, "predictive_test", lambda peak, row: SimpleNamespace(p_value=0.5, lasting=p_value))
     assert findings_of(none, weighed, fits, exact=exact).effects == found.effects

@@ -35,8 +35,9 @@ MOST_LEFT, OF_HISTORY, TINY = 0.25, 0.4, 1e-9
 than this of contacts and of what moves besides the body: right laws left 6 % at most, on casters 21 %; a patch in the
 place of a drag 37 %, casters in that place, and a load that swings in that of a catch, 50 %."""
 FORECASTS = 0.1
-"""But for one whose forecast of what was held out is off by less than this share of what the baseline's is: a crate
-that goes along beside a wheel left 41 %, and forecast metres to within centimetres. Wrong ones had 31 % at best."""
+"""But for one whose forecast of what was held out is off by less than this share of what the baseline's is: a note then
+says that there is more. A crate that goes along beside a wheel left 41 %, and forecast metres to within centimetres;
+wrong friction and catches had 31 % at best."""
 ALIKE = 3.0
 """Hypotheses within so many nats explain the recording alike."""
 SHOWN = 8
@@ -105,7 +106,11 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
         return Findings((), (), (NOTHING_TRIED,) if weighed else ())
     best, notes = others[0], []
     names = " and ".join(best.effects)
-    short = _falls_short(best, baseline, exact=exact)
+    short, left = _falls_short(best, baseline), _leaves(best, baseline) if exact else ""
+    if left and not short and _forecasts(best.fitted, baseline):
+        notes.append(f"there is more than {names}: a wrench is left over ({left})")
+    elif left and not short:
+        short = f"leaves a wrench that its law does not have ({left})"
     sure = held_by(weighed, best.effects)
     named = bool(weighed[0].effects) and sure >= NAMED and not short and not best.vetoed
     if short:
@@ -135,21 +140,25 @@ def _chance(p_value: float) -> str:
     return f"p = {p_value:.1g}" if p_value >= LEAST_TOLD else f"p < {LEAST_TOLD:g}"
 
 
-def _falls_short(best: Weighed, baseline: Fitted, *, exact: bool) -> str:
+def _falls_short(best: Weighed, baseline: Fitted) -> str:
     """Return in words by what a hypothesis falls short of the noise floor; nothing where it reaches it."""
     scale, before = best.fitted.usual_scale, baseline.usual_scale
     if scale >= EXPLAINED and (scale >= NEAR or math.log(scale) >= SHARE_LEFT * math.log(before)):
         return f"is still off by {scale:.1f} times the noise"
+    return ""
+
+
+def _leaves(best: Weighed, baseline: Fitted) -> str:
+    """Return by what chance it is noise that a hypothesis leaves a wrench, in words; nothing where it may be."""
     # Laws of friction and of contacts are a little wrong of any floor: the little that they leave says nothing.
     laws_are_exact = all(EFFECTS[name].exact for name in best.effects)
     share = best.fitted.unexplained / max(baseline.unexplained, TINY)
     most = OF_HISTORY if any(EFFECTS[name].of_history for name in best.effects) else MOST_LEFT
-    if exact and (laws_are_exact or (share > most and not _forecasts(best.fitted, baseline))):
-        verdict = predictive_test(best.fitted.peak, 0)
-        left = min(verdict.p_value, verdict.lasting)
-        if left < LEFT_OUT:
-            return f"leaves a wrench that its law does not have ({_chance(left)})"
-    return ""
+    if not laws_are_exact and share <= most:
+        return ""
+    verdict = predictive_test(best.fitted.peak, 0)
+    left = min(verdict.p_value, verdict.lasting)
+    return _chance(left) if left < LEFT_OUT else ""
 
 
 def _forecasts(fitted: Fitted, baseline: Fitted) -> bool:
