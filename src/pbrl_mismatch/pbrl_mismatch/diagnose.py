@@ -268,8 +268,8 @@ def _diagnose_object(
     explained = explain(second, track, bases, stages, grip, options)
     baseline = judged(explained.bases[0], explained.stages, options, even=True)
     verdict = predictive_test(baseline.peak, 0)
-    held = 1.0 if grip is None else grip.p_value
-    p_value = verdict.either if grip is None else least_of_two(verdict.either, held)
+    held, moves = 1.0 if grip is None else grip.p_value, verdict.either
+    p_value = moves if grip is None else least_of_two(moves, held)
     verdict = replace(verdict, p_value=with_library(p_value, explained.log_odds))
     mismatch = verdict.p_value < options.level
     weighed = held_against(explained, baseline, options) if mismatch else ()
@@ -295,12 +295,13 @@ def _diagnose_object(
         "not_shown": [each.to_report() for each in hidden],
         "unknown_description": None,
     }
-    notes = [sentence(track.object, mismatch, verdict, found), *found.notes, *missing_notes(track)]
+    notes = [sentence(track.object, mismatch, verdict, found)]
+    if mismatch and held < UNBELIEVABLE and not set(BETWEEN) & set(named.hypothesis.effects):
+        notes.append(held_otherwise(held, moves, options.level))
+    notes += [*found.notes, *missing_notes(track)]
     notes += note_on_unheard(track.unheard)
     if found.effects and baseline.score is None:
         notes.append(NOTHING_HELD_OUT)
-    if mismatch and held < UNBELIEVABLE and not set(BETWEEN) & set(named.hypothesis.effects):
-        notes.append(held_otherwise(held))
     if mismatch and not found.effects:
         try:
             report["unknown_description"] = describe_unknown(rng, track, residual, baseline.row).to_report()

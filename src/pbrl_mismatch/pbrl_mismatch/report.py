@@ -120,7 +120,7 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
     if not bool(best.fitted.peak.settled[0]):
         notes.append(f"the fit of {names} had not settled: its numbers are rough")
     alike = [each for each in others[1:] if each.log_weight > best.log_weight - ALIKE]
-    if alike:
+    if alike and weighed[0].effects:
         notes.append(f"{' and '.join(' + '.join(e.effects) for e in (best, *alike))} explain this recording alike")
     chosen = _described(replace(best, probability=sure), scene) if named else ()
     rest = others[1:] if named else others
@@ -128,12 +128,19 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
     return Findings(chosen, alternatives, tuple(notes))
 
 
-def held_otherwise(p_value: float) -> str:
-    """Return in words that gripper and body are not seen as one that holds the other, by a chance of that."""
-    return (
+def held_otherwise(p_value: float, of_motion: float, level: float) -> str:
+    """Return in words that gripper and body are not seen as one that holds the other.
+
+    Args:
+        p_value: of what the grippers' poses say.
+        of_motion: of what the motion says.
+        level: of a test.
+    """
+    told = (
         f"gripper and body are not seen as one that holds the other ({_chance(p_value)}), and nothing that is named "
         "makes them so: a tag, the gripper's frame or a camera is off, the hold gives way, or a stream is late"
     )
+    return told if of_motion < level else f"{told}; how it moves goes with the model ({_chance(of_motion)})"
 
 
 def _chance(p_value: float) -> str:
