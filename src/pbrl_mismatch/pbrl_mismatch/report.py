@@ -106,10 +106,11 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
         return Findings((), (), (NOTHING_TRIED,) if weighed else ())
     best, notes = others[0], []
     names = " and ".join(best.effects)
-    short, left = _falls_short(best, baseline), _leaves(best, baseline) if exact else ""
-    if left and not short and _forecasts(best.fitted, baseline):
+    short = _falls_short(best, baseline)
+    left = _leaves(best, baseline) if exact and not short else ""
+    if left and _forecasts(best.fitted, baseline):
         notes.append(f"there is more than {names}: a wrench is left over ({left})")
-    elif left and not short:
+    elif left:
         short = f"leaves a wrench that its law does not have ({left})"
     sure = held_by(weighed, best.effects)
     named = bool(weighed[0].effects) and sure >= NAMED and not short and not best.vetoed

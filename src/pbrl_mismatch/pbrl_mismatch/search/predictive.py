@@ -13,7 +13,7 @@ blunt and its p-values too high.
 What the wrench would do in the model is no measure: a wheel that holds a body where a pin let it go would hold it
 against the wrench as well, and the whole misfit would pass for noise.
 
-Of the D numbers some twenty are what wrenches that last would do (`lasting.py`), the others what only fleeting ones
+Of the D numbers some fifteen are what wrenches that last would do (`lasting.py`), the others what only fleeting ones
 could: two tests of which the first is the sharper by far for what goes on for long.
 """
 
