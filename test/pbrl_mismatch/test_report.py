@@ -12,6 +12,7 @@ from shapely import Polygon, contains_xy
 from pbrl_mismatch import EFFECTS, report
 from pbrl_mismatch.effects.effect import Effect, Scene, disc
 from pbrl_mismatch.report import findings_of, place_uncertainty
+from pbrl_mismatch.search.predictive import Verdict
 from pbrl_mismatch.search.weigh import Weighed
 
 COVARIANCE = np.array([[0.04, 0.018, 0.0], [0.018, 0.01, 0.0], [0.0, 0.0, 1.0]])
@@ -117,7 +118,7 @@ def test_a_law_that_leaves_a_wrench_is_not_named_if_it_is_exact_or_the_wrench_la
     named: bool,
 ) -> None:
     monkeypatch.setattr(report, "_described", lambda each, scene: each.effects)
-    monkeypatch.setattr(report, "predictive_test", lambda peak, row: SimpleNamespace(p_value=p_value, lasting=1.0))
+    monkeypatch.setattr(report, "predictive_test", lambda peak, row: Verdict(p_value, 0.0, 1, 1, 1.0))
     settled, score, before = (
         SimpleNamespace(**each) for each in ({"settled": [True]}, {"rmse_position": forecast}, {"rmse_position": 1.0})
     )
@@ -130,5 +131,5 @@ def test_a_law_that_leaves_a_wrench_is_not_named_if_it_is_exact_or_the_wrench_la
     assert any("reaches the noise floor" in note for note in found.notes) != named
     assert any("there is more" in note for note in found.notes) == (named and forecast < 0.1)
     # It is the same for a wrench that lasts and is too little to be seen among all that there could be.
-    monkeypatch.setattr(report, "predictive_test", lambda peak, row: SimpleNamespace(p_value=0.5, lasting=p_value))
+    monkeypatch.setattr(report, "predictive_test", lambda peak, row: Verdict(0.5, 0.0, 1, 1, 1.0, p_value))
     assert findings_of(none, weighed, fits, exact=exact).effects == found.effects

@@ -164,8 +164,7 @@ def _leaves(best: Weighed, baseline: Fitted) -> str:
     most = OF_HISTORY if any(EFFECTS[name].of_history for name in best.effects) else MOST_LEFT
     if not laws_are_exact and share <= most:
         return ""
-    verdict = predictive_test(best.fitted.peak, 0)
-    left = min(verdict.p_value, verdict.lasting)
+    left = predictive_test(best.fitted.peak, 0).least
     return _chance(left) if left < LEFT_OUT else ""
 
 

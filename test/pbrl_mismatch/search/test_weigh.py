@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,12 +11,15 @@ import numpy as np
 import pytest
 
 from pbrl_mismatch import EFFECTS, DiagnoseOptions
+from pbrl_mismatch.search import weigh as weighing
 from pbrl_mismatch.search.heldout import Score
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
+from pbrl_mismatch.search.predictive import Verdict
 from pbrl_mismatch.search.weigh import (
     ASTRAY,
     CLEAR,
     DISCREPANCY,
+    LEAVES,
     OF_EXACT,
     OF_HISTORY,
     VETO,
@@ -41,10 +45,22 @@ def fitted(variant: str, evidence: float, unexplained: float = 0.0, beside: floa
         of_motion=evidence - beside,
         unexplained=unexplained,
         score=None,
+        peak=None,
     )
 
 
 BASES = [fitted("free", -100.0)]
+
+
+@pytest.fixture(autouse=True)
+def left_over(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+    """Return what sets the chance that what a hypothesis leaves is noise; at first it is."""
+
+    def found(chance: float) -> None:
+        monkeypatch.setattr(weighing, "predictive_test", lambda peak, row: Verdict(0.5, 0.0, 1, 1, 1.0, chance))
+
+    found(0.5)
+    return found
 
 
 def weights(*tried: Any) -> dict[tuple[str, ...], float]:
@@ -101,6 +117,22 @@ def test_one_effect_more_takes_more_than_a_wrong_law_leaves(
     # and clearly.
     assert gained(200.0) == pytest.approx(200.0 - math.log(2.0) - share * 1000.0 - unexplained - CLEAR)
     assert gained(300.0) - gained(200.0) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(("law", "exact"), [(SLOPE, True), (TETHER, False)])
+def test_an_exact_law_that_leaves_a_wrench_for_certain_is_not_a_little_wrong(
+    left_over: Callable[[float], None], law: str, exact: bool
+) -> None:
+    other, (name,) = "time_offset", fitted(f"free + {law}", 0.0).hypothesis.effects
+
+    def gained() -> float:
+        found = weights(fitted(f"free + {law}", 1900.0), fitted(f"free + {law} + {other}/0", 1918.0))
+        return found[tuple(sorted((name, other)))] - found[(name,)]
+
+    doubtful = gained()
+    left_over(LEAVES / 2.0)
+    # Eighteen nats are more than chance, and were less than one in a hundred of what the law explains.
+    assert doubtful < 0.0 and gained() == pytest.approx(18.0 - CLEAR if exact else doubtful)
 
 
 def test_what_an_exact_law_explains_leaves_less_than_what_a_wrong_one_explains_beside_it() -> None:

@@ -79,6 +79,11 @@ class Verdict:
         """Return the chance of so large a misfit to wrenches that last or to others."""
         return unless_unbelievable(least_of_two(self.lasting, self.fleeting), self.conflict)
 
+    @property
+    def least(self) -> float:
+        """Return the smaller chance, of any wrench or of one that lasts."""
+        return min(self.p_value, self.lasting)
+
 
 def belief_conflict(peak: Peak, row: int) -> float:
     """Return the chance that what is believed of mass, inertia and delay is so far off (chi-square).

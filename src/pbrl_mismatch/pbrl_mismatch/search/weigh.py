@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from pbrl_mismatch.effects.effect import Effect
 from pbrl_mismatch.effects.registry import EFFECTS
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.fitted import Fitted
+from pbrl_mismatch.search.predictive import predictive_test
 
 VETO, VETO_SHARE = 8.0, 0.05
 """A hypothesis that predicts held-out windows worse than the baseline by this much [nat], and this share of what its
@@ -23,8 +25,9 @@ times as far off, where feet stick or a crate is met; a wrong one that the windo
 DISCREPANCY, OF_HISTORY = 0.015, 0.04
 """Share of what a law explains that its being wrong may leave for others to explain; the same of contacts and of what
 moves besides the body: how a crate or a caster is turned follows from all that was before."""
-OF_EXACT = 0.01
-"""The same of laws that are exact, for what the smoothed path and the sensor's own error leave."""
+OF_EXACT, LEAVES = 0.01, 1e-5
+"""The same of laws that are exact, for what the smoothed path and the sensor's own error leave. Such a law leaves more
+than that where the test against wrenches, which knows of both, gives what it leaves a smaller chance."""
 CLEAR = 3.0
 """One effect more has to be likelier by more than this [nat] after its prior, twenty times: where the law that it joins
 is right nothing is, in more than one recording in twenty (Markov's inequality)."""
@@ -64,7 +67,8 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
 
     Several effects together have to explain clearly more of the motion, beyond the best of their parts, than what a
     law that is a little wrong leaves for any other to take: a share of what that part explains, and as much as the
-    likeliest set of so many leaves unexplained.
+    likeliest set of so many leaves unexplained. An exact law that leaves a wrench for certain is not a little wrong:
+    something is beside it.
 
     Args:
         bases: kinds of baseline, fitted.
@@ -79,13 +83,13 @@ def weigh(bases: Sequence[Fitted], tried: Sequence[Fitted], options: DiagnoseOpt
     best = {key: max(members, key=_evidence) for key, members in groups.items()}
     sizes = {len(key) for key in groups if len(key) > 1}
     left = {size: _unexplained(each for key, each in best.items() if len(key) == size) for size in sizes}
+    left_by = cache(lambda part: _left_by(best[part], _of_motion(best[()])))
     entries = []
     for key, members in groups.items():
         prior = math.log(options.none_odds) if not key else -len(key) * math.log(singles)
         weight = prior + _averaged(members, np.array([_evidence(member) for member in members]))
         if len(key) > 1:
-            parts = [best[other] for other in groups if other and set(other) < set(key)]
-            wrong = max((_left_by(part, _of_motion(best[()])) for part in parts), default=0.0)
+            wrong = max((left_by(other) for other in groups if other and set(other) < set(key)), default=0.0)
             weight -= wrong + left[len(key)] + CLEAR * (len(key) - 1)
         limits = [_evidence(best[other]) for other in _limits(key) if other in groups]
         weight -= REFINED * max(max(limits, default=none) - none, 0.0)
@@ -105,8 +109,10 @@ def _of_motion(fitted: Fitted) -> float:
 
 def _left_by(part: Fitted, none: float) -> float:
     """Return what a part leaves for others, as its laws are a little wrong, where nothing explains `none` [nat]."""
-    share = max((_discrepancy(EFFECTS[name]) for name in part.hypothesis.effects), default=0.0)
-    return share * max(_of_motion(part) - none, 0.0)
+    laws = [EFFECTS[name] for name in part.hypothesis.effects]
+    left = max(map(_discrepancy, laws), default=0.0) * max(_of_motion(part) - none, 0.0)
+    exact = left > 0.0 and all(law.exact for law in laws)
+    return 0.0 if exact and predictive_test(part.peak, 0).least < LEAVES else left
 
 
 def _discrepancy(effect: Effect) -> float:
