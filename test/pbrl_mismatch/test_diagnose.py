@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from pbrl_bag.types import Recording, WrenchStream
 from pbrl_mismatch import DiagnoseOptions, Diagnosis, MismatchError, diagnose, track_of
 from pbrl_mismatch.diagnose import NOTHING_HELD_OUT
 from pbrl_mismatch.report import NOTHING_TRIED
+from pbrl_mismatch.search.grip import GripEvidence, grip_evidence
 from pbrl_model.errors import ModelError
 
 QUICK = {"draws": 60, "shortlist": 4, "survivors": (2,)}
@@ -108,6 +111,25 @@ def test_a_clean_recording_is_clean(concealed_recording: Callable[..., Recording
     one = diagnose(concealed_recording("clean", 1), DiagnoseOptions(baseline=("free",), **QUICK)).objects["table"]
     assert not one.mismatch and not one.effects and not one.unknown
     assert "agree" in one.notes[0]
+
+
+def test_where_only_gripper_and_body_part_no_wrench_is_placed_or_described(
+    concealed_recording: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def apart(*told: Any) -> GripEvidence:
+        return replace(grip_evidence(*told), p_value=1e-9)
+
+    # The package's `diagnose` is the function.
+    monkeypatch.setattr(import_module("pbrl_mismatch.diagnose"), "grip_evidence", apart)
+    options = DiagnoseOptions(without=without_all_but("floor_slope"), baseline=("free",), **QUICK)
+    one, dragged = (
+        diagnose(concealed_recording(effect, 1), options).objects["table"] for effect in ("clean", "viscous_drag")
+    )
+    assert one.mismatch and one.unknown and one.hold_alone
+    assert one.report["localisation"] is None and one.report["unknown_description"] is None
+    assert dragged.unknown and not dragged.hold_alone and dragged.report["localisation"] is not None
+    for each in (one, dragged):
+        assert any("gripper and body are not seen" in note for note in each.notes)
 
 
 def test_what_could_not_have_shown_is_told_at_the_level_of_the_test(dragged: Recording) -> None:

@@ -79,6 +79,7 @@ class ObjectDiagnosis:
         report: this object's part of `report.json`.
         notes: what must not be read into it, in sentences.
         next_push: the push that would tell most of the hypotheses apart; None where there is nothing to tell.
+        hold_alone: whether only gripper and body part, and how the body moves goes with the model.
     """
 
     mismatch: bool
@@ -93,6 +94,7 @@ class ObjectDiagnosis:
     report: Mapping[str, Any]
     notes: tuple[str, ...]
     next_push: NextExperiment | None = None
+    hold_alone: bool = False
 
     @property
     def repaired(self) -> Fitted:
@@ -181,7 +183,8 @@ def _diagnosed(
     found = _diagnose_object(seed, track, lay_grips(recording, track), room, told, options)
     error = wrench_error(recording, track.motions, body_of(recording.bodies[name], track.motions[0].oriented))
     notes, where = [*found.notes, *_poor_force(error)], None
-    if found.mismatch:
+    # Where the motion goes with the model there is no wrench to place, only noise.
+    if found.mismatch and not found.hold_alone:
         try:
             where = localise(track, found.baseline.row, recording)
             notes += contact_notes(name, where.contacts)
@@ -296,13 +299,15 @@ def _diagnose_object(
         "unknown_description": None,
     }
     notes = [sentence(track.object, mismatch, verdict, found)]
-    if mismatch and held < UNBELIEVABLE and not set(BETWEEN) & set(named.hypothesis.effects):
+    between = mismatch and held < UNBELIEVABLE and not set(BETWEEN) & set(named.hypothesis.effects)
+    hold_alone = between and not found.effects and moves >= options.level
+    if between:
         notes.append(held_otherwise(held, moves, options.level))
     notes += [*found.notes, *missing_notes(track)]
     notes += note_on_unheard(track.unheard)
     if found.effects and baseline.score is None:
         notes.append(NOTHING_HELD_OUT)
-    if mismatch and not found.effects:
+    if mismatch and not found.effects and not hold_alone:
         try:
             report["unknown_description"] = describe_unknown(rng, track, residual, baseline.row).to_report()
         except MismatchError as error:
@@ -321,6 +326,7 @@ def _diagnose_object(
         report,
         tuple(notes),
         push,
+        hold_alone,
     )
 
 
