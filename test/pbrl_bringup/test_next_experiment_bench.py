@@ -35,8 +35,8 @@ def recording() -> Recording:
     )
 
 
-def told(chosen: int, random: int) -> Told:
-    return Told(GROUPS[0], "viscous_drag", 1, 0.5, chosen, random, (False, False), (0.5,))
+def told(chosen: int, random: int, acted: bool = True) -> Told:
+    return Told(GROUPS[0], "viscous_drag", 1, 0.5, chosen, random, (False, False), acted, (0.5,))
 
 
 def test_scored_cases_have_scored_seeds_and_every_effect_is_true_once() -> None:
@@ -64,4 +64,12 @@ def test_the_row_compares_medians_with_half_of_chance() -> None:
     row = rows_of([told(2, 2), told(MOST + 1, 2)])[0]
     assert not row.holds
     assert not rows_of([])[0].holds
+    assert not rows_of([told(1, 2, False)])[0].holds
     assert figure([told(1, 2)]).axes[0].get_legend() is not None
+
+
+def test_cases_in_which_the_effect_never_acted_are_counted_apart() -> None:
+    slack = told(MOST + 1, MOST + 1, False)
+    row, within, _ = rows_of([told(1, 2), told(1, 4), told(2, 2), slack, slack])
+    assert (row.value, row.against["random"], row.against["never_acted"]) == (1.0, 2.0, 2.0) and within.value == 1.0
+    assert (row.against["median_of_all"], row.against["median_of_all_random"]) == (2.0, 4.0)

@@ -2,7 +2,8 @@
 
 One effect of a group is true in Bullet, which of them is concealed. A first push, short, slow and straight, leaves
 several possible. Then pushes are made one by one, either those with the largest expected information or any of the same
-candidates, and after each the hypotheses are weighed anew on all that was recorded, until the true one has 0.95.
+candidates, and after each the hypotheses are weighed anew on all that was recorded, until the true one has 0.95. A case
+counts where the effect acted in one of its pushes at least: of a cord that stays slack in all, no push can tell.
 Between pushes the table is held where it is; every push is a recording of its own, and all are laid end to end.
 """
 
@@ -76,6 +77,7 @@ class Told:
         chosen: pushes by expected information until the truth had 0.95.
         random: pushes at random.
         misled: whether a wrong hypothesis had 0.95 on the way, by how pushes were chosen.
+        acted: whether the effect acted in any of all these pushes, from the simulator's truth.
         bits: expected of each chosen push.
     """
 
@@ -86,13 +88,14 @@ class Told:
     chosen: int
     random: int
     misled: tuple[bool, bool]
+    acted: bool
     bits: tuple[float, ...]
 
 
 def measure(seed: int, quick: bool, out: Path) -> Measured:
     """Run every group with each of its effects true."""
     told = [each for each in in_parallel(run_case, cases_of(seed, quick), "cases") if each is not None]
-    figure(told).savefig(out / "figure.png", dpi=110)
+    figure([each for each in told if each.acted]).savefig(out / "figure.png", dpi=110)
     return Measured(rows_of(told), {"cases": [asdict(each) for each in told]})
 
 
@@ -115,10 +118,10 @@ def run_case(group: tuple[str, ...], truth: str, seed: int) -> Told | None:
         except (SimError, BringupError, MismatchError):  # MismatchError: it hardly moved
             continue
         if max(each.probability for each in weighed) < SURE:
-            chosen, misled, bits = _until_told(first, group, truth, seed, random=False)
-            any_of_them, misled_too, _ = _until_told(first, group, truth, seed, random=True)
+            run, other = (_until_told(first, group, truth, seed, random=random) for random in (False, True))
+            misled, acted = (run.misled, other.misled), run.acted or other.acted
             begun = _probability(weighed, truth)
-            return Told(group, truth, seed, begun, chosen, any_of_them, (misled, misled_too), bits)
+            return Told(group, truth, seed, begun, run.pushes, other.pushes, misled, acted, run.bits)
     return None
 
 
@@ -131,12 +134,14 @@ class _Table:
         pose: of the table.
         seed: of the simulation.
         recording: of all pushes so far; empty of episodes at first.
+        acted: whether what is concealed acted in one of them.
     """
 
     scene: dict[str, object]
     pose: tuple[float, float, float]
     seed: int
     recording: Recording
+    acted: bool = False
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, truth: str) -> _Table:
@@ -168,7 +173,8 @@ class _Table:
         end = made.bodies[NAME].pose[-1]
         recording = to_recording(made, scene)
         joined = recording if not self.recording.grasps else laid_after(self.recording, recording)
-        return replace(self, pose=(float(end[0]), float(end[1]), float(end[2])), recording=joined)
+        acted = self.acted or any(each.acting.any() for each in made.activities.values())
+        return replace(self, pose=(float(end[0]), float(end[1]), float(end[2])), recording=joined, acted=acted)
 
 
 def laid_after(first: Recording, second: Recording) -> Recording:
@@ -213,10 +219,21 @@ def weighed_by(recording: Recording, names: Sequence[str], seed: int) -> tuple[t
     return weigh(bases, tried, options), track
 
 
-def _until_told(
-    table: _Table, group: Sequence[str], truth: str, seed: int, *, random: bool
-) -> tuple[int, bool, tuple[float, ...]]:
-    """Return how many pushes it took, whether a wrong hypothesis was sure on the way, and the bits expected of each."""
+@dataclass(frozen=True)
+class _Run:
+    """Pushes that it took until the truth was told, whether a wrong one was sure on the way, and `acted` of the table.
+
+    Bits are what was expected of each push.
+    """
+
+    pushes: int
+    misled: bool
+    acted: bool
+    bits: tuple[float, ...]
+
+
+def _until_told(table: _Table, group: Sequence[str], truth: str, seed: int, *, random: bool) -> _Run:
+    """Push until the truth is told."""
     rng = np.random.default_rng([seed, 3, int(random)])
     reach = Reach(speeds=SPEEDS, durations=DURATIONS, room=table.recording.room)
     choose = random_experiment if random else next_experiment
@@ -233,9 +250,9 @@ def _until_told(
             continue
         weighed, track = weighed_by(table.recording, group, seed)
         if _probability(weighed, truth) >= SURE:
-            return number, misled, tuple(bits)
+            return _Run(number, misled, table.acted, tuple(bits))
         misled = misled or max(each.probability for each in weighed) >= SURE
-    return MOST + 1, misled, tuple(bits)
+    return _Run(MOST + 1, misled, table.acted, tuple(bits))
 
 
 def _probability(weighed: Sequence[Weighed], truth: str) -> float:
@@ -263,20 +280,24 @@ def _as_push(plan: NextExperiment) -> HandPush:
 
 
 def rows_of(told: Sequence[Told]) -> list[Row]:
-    """Return the acceptance row, and how often a wrong hypothesis was sure on the way."""
-    chosen, at_random = (np.array([getattr(each, how) for each in told], dtype=float) for how in ("chosen", "random"))
-    if not told:
+    """Return the acceptance row, and how often a wrong hypothesis was sure on the way; of cases in which it acted."""
+    counted = [each for each in told if each.acted]
+    chosen, at_random = (np.array([getattr(each, how) for each in counted], float) for how in ("chosen", "random"))
+    if not counted:
         return [at_most("pushes until the truth has 0.95, chosen over random", math.nan, "1", 0.5)]
     middle = float(np.median(at_random))
     return [
         at_most(
-            f"pushes until the truth has 0.95, median of {len(told)} cases, chosen by expected information",
+            f"pushes until the truth has 0.95, median of {len(counted)} cases, chosen by expected information",
             float(np.median(chosen)),
             "1",
             0.5 * middle,
             random=middle,
             mean=float(chosen.mean()),
             mean_random=float(at_random.mean()),
+            never_acted=float(len(told) - len(counted)),
+            median_of_all=float(np.median([each.chosen for each in told])),
+            median_of_all_random=float(np.median([each.random for each in told])),
         ),
         at_least(
             f"told within {MOST} pushes, share of cases",
@@ -287,10 +308,10 @@ def rows_of(told: Sequence[Told]) -> list[Row]:
         ),
         at_most(
             "a wrong hypothesis had 0.95 on the way, share of cases",
-            float(np.mean([each.misled[0] for each in told])),
+            float(np.mean([each.misled[0] for each in counted])),
             "1",
             0.05,
-            random=float(np.mean([each.misled[1] for each in told])),
+            random=float(np.mean([each.misled[1] for each in counted])),
         ),
     ]
 
