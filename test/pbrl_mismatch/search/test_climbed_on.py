@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,16 @@ from pbrl_mismatch import EFFECTS, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.climb import climb
-from pbrl_mismatch.search.climbed_on import BEHIND, over_longest, parts_led, polished, starts_from
+from pbrl_mismatch.search.climbed_on import (
+    BEHIND,
+    BEYOND_PATH,
+    elsewhen,
+    over_longest,
+    parts_led,
+    polished,
+    sets_led,
+    starts_from,
+)
 from pbrl_mismatch.search.fitted import Fitted, Stages, alone, scene_of
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE
 from pbrl_mismatch.search.hypothesis import BaselineOptions, baselines
@@ -53,6 +63,31 @@ def test_what_another_effect_does_nothing_to_is_told_as_well_without_it(fitted: 
     assert led.misfit[1] == pytest.approx(nothing.peak.misfit[0], rel=1e-9)
 
 
+@pytest.mark.parametrize("behind", [2.0, 0.5, None])
+def test_what_comes_or_goes_is_sought_all_over_beside_what_simulations_alone_tell(
+    fitted: Any, behind: float | None
+) -> None:
+    sloped = fitted[1]
+    cuts = sloped.peak.objective.cuts
+    scene = scene_of(cuts.track, sloped.hypothesis.rows(sloped.peak.coordinates)[0])
+    both = sloped.hypothesis.with_effect(EFFECTS["payload_change"], scene, 0)
+    laid = Fitted(both, climb(Objective(both, cuts, FLOOR), both.mean[None], iterations=0), None)
+    if behind is not None:
+        path: Any = SimpleNamespace(evidence=laid.simulated - behind * BEYOND_PATH)
+        laid = replace(laid, traced=path)
+    coordinates, begins = elsewhen(laid, sloped)
+    if behind != 2.0:  # there is no path, or it tells about as much
+        assert len(coordinates) == len(begins) == 0
+        return
+    when, clock = both.columns.index("payload_time"), cuts.track.clock
+    assert np.all(np.diff(coordinates[:, when]) > 0.0) and coordinates.shape[1] == len(both.columns)
+    assert np.ptp(coordinates[:, when]) > 0.9 * np.ptp(clock)
+    for column, value in zip(sloped.hypothesis.columns, sloped.peak.coordinates[0], strict=True):
+        assert np.all(coordinates[:, both.columns.index(column)] == value)
+    assert all(np.array_equal(each, sloped.peak.nuisance[0]) for each in begins)
+    assert len(elsewhen(laid, laid)[0]) == 0  # the ground has it
+
+
 def with_effects(fitted: Fitted, *effects: str) -> Fitted:
     return replace(fitted, hypothesis=replace(fitted.hypothesis, effects=effects))
 
@@ -71,6 +106,25 @@ def test_parts_of_a_set_are_led_to_where_it_has_them_and_nothing_else_is(fitted:
     led = parts_led(weighed, [short, other], stages, options)
     assert led[0].evidence >= sloped.evidence - 1e-6 > short.evidence
     assert led[1] is other
+
+
+def test_a_set_is_climbed_on_from_where_its_part_was_led_to_and_from_no_other(fitted: Any) -> None:
+    sloped = fitted[1]
+    cuts = sloped.peak.objective.cuts
+    stages, options = Stages((cuts,), ()), DiagnoseOptions(iterations=(2, 2))
+    scene = scene_of(cuts.track, sloped.hypothesis.rows(sloped.peak.coordinates)[0])
+    both = sloped.hypothesis.with_effect(EFFECTS["time_offset"], scene, 0)
+    whole = Fitted(both, climb(Objective(both, cuts, FLOOR), both.mean[None], iterations=0), None)
+    short = replace(sloped, peak=climb(sloped.peak.objective, sloped.hypothesis.mean[None], iterations=0))
+    other = with_effects(whole, "floor_patch", "detent")
+    before, now = [short, whole, other], [sloped, whole, other]
+    weighed = in_order(*now)
+    led = sets_led(weighed, before, now, stages, options)
+    assert led[0] is sloped and led[2] is other
+    # A delay of which there is nothing loses no more than its freedom costs.
+    assert led[1].simulated > sloped.simulated - 5.0 > whole.simulated
+    unchanged = sets_led(weighed, now, now, stages, options)
+    assert all(one is same for one, same in zip(unchanged, now, strict=True))
 
 
 def test_every_set_that_explains_more_leads_whatever_the_likeliest_is(fitted: Any) -> None:

@@ -19,6 +19,7 @@ from pbrl_mismatch.search.hypothesis import BELIEVED, Hypothesis
 from pbrl_mismatch.search.library import trace
 from pbrl_mismatch.search.objective import Objective
 from pbrl_mismatch.search.path.ground import traced
+from pbrl_mismatch.search.path.moments import at_moments
 from pbrl_mismatch.search.weigh import Weighed
 
 Array = NDArray[np.float64]
@@ -32,6 +33,8 @@ EXPLAINS = 10.0
 LEADS = 3
 """So many of the likeliest effects lead a baseline to where they have the body's own parameters, and so many of the
 sets that explain most lead their parts."""
+LED_AHEAD = 3.0
+"""A part that was led on by more [nat] leads the sets that it is in."""
 LED = 100.0
 """Kinds of baseline that are worse than the best by more [nat], simulated too, are not led: no other top would do. Nor
 are effects tried on richer kinds than the best that are."""
@@ -39,6 +42,9 @@ FREEDOM = 1.0
 """An effect that says nothing is less likely than the baseline by about so much at least, for its freedom [nat]."""
 FAINT = 2.0
 """What a law has that its limit has not begins so many deviations of its prior below the mean."""
+BEYOND_PATH = 50.0
+"""Where simulations are likelier than the path by more [nat], as beside a contact, the path has not told when something
+came or went."""
 
 
 def led(bases: list[Fitted], tried: list[Fitted], stages: Stages, options: DiagnoseOptions) -> list[Fitted]:
@@ -103,7 +109,9 @@ def polished(
 def _climbed_on(fitted: Fitted, best: Fitted, stages: Stages, options: DiagnoseOptions) -> Fitted:
     """Return a hypothesis climbed on from where it is, and from where another has the body's own parameters."""
     objective = Objective(fitted.hypothesis, stages.fitted[-1], options.sensor_floor)
-    first = climb(objective, *starts_from(fitted, best), iterations=TRIED_OUT, rough=True)
+    starts = [starts_from(fitted, best), *([elsewhen(fitted, best)] if is_part(best, fitted) else [])]
+    coordinates, begins = (np.concatenate(each) for each in zip(*starts, strict=True))
+    first = climb(objective, coordinates, begins, iterations=TRIED_OUT, rough=True)
     # Where no start has any evidence none is behind.
     order = first.ranked[~(first.evidence[first.ranked] < first.evidence[first.best] - BEHIND)]
     likely = first.take(order[apart_rows(first.coordinates[order], fitted.hypothesis.spread, GO_ON)])
@@ -148,6 +156,23 @@ def starts_from(fitted: Fitted, best: Fitted) -> tuple[Array, Array]:
         starts += [(fitted.traced.coordinates, begins)]
     coordinates, nuisances = (np.array(each) for each in zip(*starts, strict=True))
     return np.concatenate([coordinates] * 2), np.concatenate([nuisances, np.zeros_like(nuisances)])
+
+
+def elsewhen(fitted: Fitted, ground: Fitted) -> tuple[Array, Array]:
+    """Return starts as `starts_from` does, of what comes or goes beside a ground at other moments.
+
+    The rest is as the ground has it: a load that is put on at a wrong moment moves the contact that it is beside, and
+    neither finds back without the other. There are none where the path has told the moment.
+    """
+    hypothesis, begins = fitted.hypothesis, ground.peak.nuisance[0]
+    on_path = math.inf if fitted.traced is None else fitted.traced.evidence
+    laid = set(hypothesis.effects) - set(ground.hypothesis.effects) if fitted.simulated > on_path + BEYOND_PATH else ()
+    crossed = _crossed(hypothesis, fitted.peak.coordinates[0], ground.hypothesis, ground.peak.coordinates[0])
+    moments = [column for name in sorted(laid) for column in EFFECTS[name].moments if column in hypothesis.columns]
+    clock = fitted.peak.objective.cuts.track.clock
+    starts = [at_moments(crossed[None], hypothesis.columns.index(column), clock)[1:] for column in moments]
+    coordinates = np.concatenate([np.zeros((0, len(crossed))), *starts])
+    return coordinates, np.broadcast_to(begins, (len(coordinates), *begins.shape))
 
 
 def _crossed(
@@ -248,3 +273,31 @@ def parts_led(
 
     with ThreadPoolExecutor(options.workers) as pool:
         return list(pool.map(led_on, tried))
+
+
+def sets_led(
+    weighed: tuple[Weighed, ...], before: list[Fitted], tried: list[Fitted], stages: Stages, options: DiagnoseOptions
+) -> list[Fitted]:
+    """Return what was tried, the likeliest sets climbed on from where parts of theirs were led to by other sets.
+
+    A crate was ten centimetres off, and the load that was tried beside it put on where that mends most; friction beside
+    it led it to its place, and there the load has another moment.
+
+    Args:
+        weighed: hypotheses, likeliest first.
+        before: what was tried as it was before parts were led.
+        tried: as it is now, in the same order.
+        stages: windows.
+        options: settings.
+    """
+    ahead = [now for now, then in zip(tried, before, strict=True) if now.evidence > then.evidence + LED_AHEAD]
+    chosen = {id(each) for each in _sets(weighed)[:POLISHED_OF_SETS]}
+
+    def led_on(then: Fitted, whole: Fitted) -> Fitted:
+        found = whole
+        for part in ahead if id(then) in chosen else []:
+            found = _climbed_on(found, part, stages, options) if is_part(part, whole) else found
+        return found
+
+    with ThreadPoolExecutor(options.workers) as pool:
+        return list(pool.map(led_on, before, tried))

@@ -21,6 +21,7 @@ from pbrl_mismatch.search.climbed_on import (
     over_longest,
     parts_led,
     polished,
+    sets_led,
 )
 from pbrl_mismatch.search.fitted import Fitted, Stages, judged, likeliest_first
 from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
@@ -123,7 +124,8 @@ def explain(
     if given_up is not None and (back := with_sets(given_up, weighed, grip, options)) is not None:
         stages, bases, tried = back.stages, back.bases, back.tried
         weighed = weigh(bases, tried, options)
-    tried = [beside_motion(each, grip) for each in parts_led(weighed, tried, stages, options)]
+    led_on = [beside_motion(each, grip) for each in parts_led(weighed, tried, stages, options)]
+    tried = [beside_motion(each, grip) for each in sets_led(weighed, tried, led_on, stages, options)]
     return Explained(weigh(bases, tried, options), bases, stages, odds)
 
 
