@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from pbrl_bag import write_recording
 from pbrl_bringup.cli.app import run_arguments
+from pbrl_bringup.commands import diagnose as command
 from pbrl_bringup.concealed.cases import Case, make
+from pbrl_bringup.diagnosis.residuals import RESULTS
 
 
 @pytest.fixture(scope="module")
@@ -46,3 +50,24 @@ def test_options_that_do_not_fit_are_told(
     assert run_arguments(["diagnose", str(bag), "--out", str(tmp_path / "found"), *arguments]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "found").exists()
+
+
+def test_results_in_a_folder_are_of_one_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a page cannot be drawn, no report of this run or of one before says that the rest is there."""
+
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    for name in (*RESULTS, "notes.txt"):
+        (tmp_path / name).write_text("of another run")
+    monkeypatch.setattr(command, "write_models", lambda *_: {})
+    monkeypatch.setattr(command, "write_diagnosis", interrupted)
+    found: Any = SimpleNamespace(objects={}, to_report=dict)
+    anything: Any = SimpleNamespace(seed=0)
+    with pytest.raises(KeyboardInterrupt):
+        command.write_found(found, anything, tmp_path, "./pbrl diagnose", anything)
+    assert {each.name for each in tmp_path.iterdir()} == {"residual.json", "notes.txt"}
+    assert "another run" not in (tmp_path / "residual.json").read_text()
+    monkeypatch.setattr(command, "write_diagnosis", lambda *_, **__: None)
+    command.write_found(found, anything, tmp_path, "./pbrl diagnose", anything)
+    assert (tmp_path / "report.json").read_text() == "{}\n"

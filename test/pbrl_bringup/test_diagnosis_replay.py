@@ -6,13 +6,17 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from pbrl_bringup.debian import ensure_program
+from pbrl_bringup.diagnosis import page as page_module
+from pbrl_bringup.diagnosis.figures import frames
 from pbrl_bringup.diagnosis.models import write_models
 from pbrl_bringup.diagnosis.page import render_diagnosis
 from pbrl_bringup.diagnosis.replay import replay_of
@@ -143,6 +147,43 @@ def test_a_reader_is_told_of_a_repair_that_forecasts_worse() -> None:
 
     assert forecast_caution({}) == forecast_caution(report(None, None)) == forecast_caution(report(0.02, 0.021)) == ""
     assert "2.5 times as far off" in forecast_caution(report(0.02, 0.05))
+
+
+def test_an_outline_of_a_thousand_corners_is_drawn(
+    diagnosed: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording, found = diagnosed
+    angle = np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False)
+    outline = 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
+    monkeypatch.setattr(page_module, "replay_of", lambda *told: replace(replay_of(*told), outline=outline))
+    driven(render_diagnosis(found, recording, "./pbrl diagnose bag", options=OPTIONS), tmp_path)
+
+
+def test_where_nothing_was_held_out_no_forecast_is_shown(
+    diagnosed: Any, page: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording, found = diagnosed
+    monkeypatch.setattr(page_module, "replay_of", lambda *told: replace(replay_of(*told), held_out=()))
+    bare = render_diagnosis(found, recording, "./pbrl diagnose bag", options=OPTIONS)
+    shown = ("held out for the score", "fitted again without the shaded stretches", "Forecasts of stretches")
+    assert all(each in page and each not in bare for each in shown)
+    assert "no push lasts long enough" in bare and "no push lasts long enough" not in page
+    assert bare.count("<svg") == page.count("<svg") - 1
+
+
+def test_the_floor_has_the_object_where_its_own_frame_is() -> None:
+    way = np.array([[1.0, 2.0, 0.0], [1.5, 2.5, 0.5 * np.pi]])
+    found: Any = SimpleNamespace(
+        residual=SimpleNamespace(path=np.hstack([way, np.zeros((2, 3))])),
+        baseline=SimpleNamespace(
+            peak=SimpleNamespace(
+                objective=SimpleNamespace(
+                    cuts=SimpleNamespace(track=SimpleNamespace(body=np.array([20.0, 0.5, 0.1, 2.0])))
+                )
+            )
+        ),
+    )
+    assert frames(found) == pytest.approx(np.array([[0.5, 1.9, 0.0], [1.6, 2.0, 0.5 * np.pi]]))
 
 
 def driven(page: str, tmp_path: Path) -> list[Any]:

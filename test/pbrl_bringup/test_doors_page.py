@@ -40,3 +40,14 @@ def test_the_page_stands_alone_and_says_what_was_found(out: Path) -> None:
     page = (out / "report.html").read_text()
     assert "detent at 2.9" in page and page.count("<svg") == 4
     assert 'src="' not in page and "https://" not in page.replace("https://matplotlib.org", "")
+
+
+@pytest.mark.parametrize("option", [("--most-together", "1"), ("--mass-spread", "0.2")])
+def test_an_option_that_says_nothing_of_a_door_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: tuple[str, str]
+) -> None:
+    mapping = str(config_file("mappings", "pr2_cabinet"))
+    bag = str(data_file("pr2_cabinet/lab_cabinet.csv"))
+    assert run_arguments(["diagnose", bag, "--map", mapping, "--out", str(tmp_path / "found"), *option]) != 0
+    assert f"expected no {option[0]} of a recording of nothing but a path" in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "found").exists()

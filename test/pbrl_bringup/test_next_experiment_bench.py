@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pbrl_bag.types import Grasp, PoseStream, Recording, WrenchStream
+from pbrl_bringup.benches import next_experiment as bench
 from pbrl_bringup.benches.next_experiment import (
     FIRST_SEED,
     GROUPS,
@@ -17,8 +21,10 @@ from pbrl_bringup.benches.next_experiment import (
     figure,
     laid_after,
     rows_of,
+    until_told,
 )
 from pbrl_bringup.commands.bench import BENCHES
+from pbrl_model.errors import ModelError
 
 
 @pytest.fixture(scope="module")
@@ -73,3 +79,27 @@ def test_cases_in_which_the_effect_never_acted_are_counted_apart() -> None:
     row, within, _ = rows_of([told(1, 2), told(1, 4), told(2, 2), slack, slack])
     assert (row.value, row.against["random"], row.against["never_acted"]) == (1.0, 2.0, 2.0) and within.value == 1.0
     assert (row.against["median_of_all"], row.against["median_of_all_random"]) == (2.0, 4.0)
+
+
+def test_a_push_whose_recording_is_refused_costs_a_push_and_not_the_bench(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def weighed(of: Recording, names: Any, seed: int) -> Any:
+        if of.path.name == "refused":
+            raise ModelError("table: expected a pose")
+        sure = 0.99 if of.path.name == "good" else 0.5
+        return [SimpleNamespace(effects=("tether",), probability=sure)], None
+
+    made: list[str] = []
+
+    class Table(SimpleNamespace):
+        def pushed(self, push: Any, number: int) -> Any:
+            made.append(self.recording.path.name)
+            return Table(recording=replace(recording, path=Path("refused" if number == 1 else "good")), acted=True)
+
+    plan = SimpleNamespace(expected_bits=1.0, direction=(1.0, 0.0), speed=0.1, duration=1.0, contact_point=(0.0, 0.0))
+    monkeypatch.setattr(bench, "weighed_by", weighed)
+    monkeypatch.setattr(bench, "next_experiment", lambda *_: plan)
+    table: Any = Table(recording=replace(recording, room=np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]])), acted=False)
+    run = until_told(table, ("tether",), "tether", 1, random=False)
+    assert run.pushes == 2 and not run.misled and made == ["push", "push"]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +18,9 @@ from pbrl_mismatch.effects.grasp_compliance import PARAMETERS
 from pbrl_mismatch.effects.pose_bias import PARAMETERS as TAG_PARAMETERS
 from pbrl_mismatch.kernels.columns import neutral_row
 from pbrl_mismatch.observability.power import needed
+from pbrl_mismatch.search import grip as gripping
 from pbrl_mismatch.search.grip import (
+    BETWEEN,
     CAMERA_SPREAD,
     FREE_PLACE,
     NEW_RUBBER,
@@ -24,6 +28,7 @@ from pbrl_mismatch.search.grip import (
     POINT_SPREAD,
     SOFT_FORCE,
     grip_evidence,
+    moved_on,
 )
 from pbrl_mismatch.search.grip_noise import LASTS
 from pbrl_mismatch.search.hypothesis import Hypothesis
@@ -90,6 +95,29 @@ def test_a_body_that_is_seen_far_from_where_it_is_held_is_a_mismatch_whatever_th
         # Of a centimetre that each grasp may be off nobody is surprised, of five of all of them one is.
         assert grip_evidence(seen_off(grips, np.array([0.05, -0.04, 0.0])), DELAY).p_value < 1e-3 < told
         assert grip_evidence(seen_off(grips, np.array([0.004, 0.003, 0.0])), DELAY).p_value > 0.1 * told
+
+
+def test_what_a_told_model_has_between_gripper_and_body_is_no_mismatch_and_not_found_again() -> None:
+    none = (np.zeros(0), np.zeros((0, 0)))
+    for seed in range(4):
+        grips = readings(np.random.default_rng(seed))
+        cases = {
+            "grasp_compliance": readings(np.random.default_rng(seed), compliance=6e-4),
+            "time_offset": readings(np.random.default_rng(seed), late=0.15),
+            "pose_bias": seen_off(grips, np.array([0.08, -0.07, 0.0])),
+        }
+        for effect, recorded in cases.items():
+            assert grip_evidence(recorded, DELAY).p_value < 1e-3
+            found = grip_evidence(recorded, DELAY, (effect,))
+            assert found.p_value > 0.01, effect
+            if effect == "pose_bias":
+                continue  # its coordinates are the motion's
+            model = Hypothesis((), "told", (), neutral_row(), told=(effect,))
+            assert found.beside(model, *none) == found.beside(replace(model, effects=(effect,), told=()), *none)
+            assert found.beyond(model, *none, BETWEEN) < 3.0 < found.beyond(replace(model, told=()), *none, BETWEEN)
+            # What the model does not have is a mismatch as before.
+            other = "time_offset" if effect == "grasp_compliance" else "grasp_compliance"
+            assert grip_evidence(recorded, DELAY, (other,)).p_value < 1e-3
 
 
 def test_the_odds_of_a_tag_s_offset_are_those_of_the_gaussian_that_it_is() -> None:
@@ -240,17 +268,61 @@ def test_what_one_effect_says_of_the_readings_the_others_are_held_against() -> N
         return Hypothesis(names, "free", (), neutral_row())
 
     late = grip_evidence(readings(np.random.default_rng(3), late=0.1), DELAY)
-    assert late.beyond(with_effects(), *nothing) > 5.0 > late.beyond(with_effects("time_offset"), *nothing)
+    assert late.beyond(with_effects(), *nothing, BETWEEN) > 5.0
+    assert late.beyond(with_effects("time_offset"), *nothing, BETWEEN) < 5.0
+    # What the library does without would explain nothing.
+    assert late.beyond(with_effects(), *nothing, ["viscous_drag"]) == -np.inf
     both = grip_evidence(readings(np.random.default_rng(3), 6e-4, late=0.1), DELAY)
     for names in (("grasp_compliance",), ("time_offset",)):
-        assert both.beyond(with_effects(*names), *nothing) > 5.0
-    assert both.beyond(with_effects("grasp_compliance", "viscous_drag", "time_offset"), *nothing) < 5.0
+        assert both.beyond(with_effects(*names), *nothing, BETWEEN) > 5.0
+    assert both.beyond(with_effects("grasp_compliance", "viscous_drag", "time_offset"), *nothing, BETWEEN) < 5.0
     # What the motion says of a tag is what the readings are held against; what else is on does not matter.
     wide, off = np.diag([0.06, 0.06, 0.15]) ** 2, np.array([0.04, -0.03, 0.02])
     tag = grip_evidence(seen_off(readings(np.random.default_rng(5)), off), DELAY)
     named = Hypothesis(("pose_bias",), "free", TAG_PARAMETERS, neutral_row())
-    assert tag.beyond(with_effects("viscous_drag"), *nothing) > 5.0 > tag.beyond(named, off, 1e-6 * wide)
+    assert tag.beyond(with_effects("viscous_drag"), *nothing, BETWEEN) > 5.0
+    assert tag.beyond(named, off, 1e-6 * wide, BETWEEN) < 5.0
     assert tag.beside(named, np.zeros(3), wide) > tag.beside(named, -off, 1e-6 * wide)
+
+
+def test_a_hold_that_gives_way_moves_on_with_what_it_was_laid_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fit(variant: str, evidence: float) -> Any:
+        return SimpleNamespace(hypothesis=SimpleNamespace(variant=variant), evidence=evidence)
+
+    monkeypatch.setattr(gripping, "beside_motion", lambda each, grip: each)
+    hold = " + grasp_compliance/0"
+    monkeypatch.setattr(
+        gripping, "gives_way", lambda each, grip: fit(f"{each.hypothesis.variant}{hold}", each.evidence + 8.0)
+    )
+    bases = [fit("free", 20.0), fit("wheel", 10.0)]
+    tried = [fit("free + floor_patch/0", 115.0), fit(f"free + floor_patch/0{hold}", 108.0), fit(f"free{hold}", 13.0)]
+    tried += [fit(f"wheel{hold}", 50.0), fit(f"caster{hold}", 5.0), fit("free + tether/0", 90.0)]
+    grip: Any = object()
+    found = moved_on(tried, bases, grip)
+    assert [each.hypothesis.variant for each in found] == [each.hypothesis.variant for each in tried]
+    # Of a ground that is no longer there, and of one that is behind, it stays as it was.
+    assert [each.evidence for each in found] == [115.0, 123.0, 28.0, 50.0, 5.0, 90.0]
+    assert moved_on(tried, bases, None) == tried
+
+
+def test_a_gripper_that_is_seen_without_its_orientation_says_nothing(
+    concealed_recording: Callable[..., Recording],
+) -> None:
+    recording = concealed_recording("clean", 1)
+    track = track_of(recording, "table")
+    whole = lay_grips(recording, track)
+    ((name, stream),) = recording.gripper_poses.items()
+    bare = np.full_like(stream.quaternion, np.nan)
+    assert lay_grips(replace(recording, gripper_poses={name: replace(stream, quaternion=bare)}), track) is None
+    bare[: len(bare) // 2] = stream.quaternion[: len(bare) // 2]
+    half = lay_grips(replace(recording, gripper_poses={name: replace(stream, quaternion=bare)}), track)
+    assert half is not None and whole is not None and 0 < len(half.time) < len(whole.time)
+    assert np.isfinite(half.place).all() and np.isfinite(half.turn).all()
+
+
+def test_readings_that_a_law_fits_exactly_are_weighed() -> None:
+    grips = readings(np.random.default_rng(4))
+    assert grip_evidence(replace(grips, place=np.zeros_like(grips.place)), DELAY).p_value > 0.5
 
 
 def test_where_no_gripper_was_seen_nothing_is_said(concealed_recording: Callable[..., Recording]) -> None:

@@ -148,6 +148,15 @@ def test_a_sensor_s_faults_act_on_what_it_measured_and_on_nothing_else(track: An
     assert np.allclose(predict_repaired(faulty, start, wrench, body_wrench=True, measured=True), clean, atol=1e-3)
     really = predict_repaired(model, start, wrench, body_wrench=True)
     assert np.array_equal(predict_repaired(faulty, start, wrench, body_wrench=True), really)
+    # An offset that comes on in the middle has acted for the second half, and a drift for as long as there was to act.
+    start_at = model.parameters["delay"].model_copy(update={"unit": "s", "best": 0.495})  # between two steps
+    late = LearnedEffect(effect="wrench_bias", parameters={"bias_x": bias, "bias_start": start_at})
+    drift = LearnedEffect(effect="wrench_bias", parameters={"drift_x": bias.model_copy(update={"unit": "N/s"})})
+    clock = np.arange(100)[:, None] / 100.0
+    for effect, off in ((late, clock >= 0.5), (drift, clock)):
+        told = model.model_copy(update={"effects": (*model.effects, effect)})
+        clean = predict_repaired(model, start, wrench - 2.0 * off * [1.0, 0.0, 0.0], body_wrench=True)
+        assert np.allclose(predict_repaired(told, start, wrench, body_wrench=True, measured=True), clean, atol=1e-4)
     with pytest.raises(MismatchError, match="set body_wrench"):
         predict_repaired(faulty, start, wrench, measured=True)
 

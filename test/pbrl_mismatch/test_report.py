@@ -11,7 +11,7 @@ from shapely import Polygon, contains_xy
 
 from pbrl_mismatch import EFFECTS, report
 from pbrl_mismatch.effects.effect import Effect, Scene, disc
-from pbrl_mismatch.report import findings_of, place_uncertainty
+from pbrl_mismatch.report import findings_of, place_uncertainty, sentence
 from pbrl_mismatch.search.predictive import Verdict
 from pbrl_mismatch.search.weigh import Weighed
 
@@ -90,6 +90,22 @@ def test_one_effect_is_named_where_only_what_is_beside_it_is_open(monkeypatch: p
     found = findings_of(fits, weighed, fits, exact=False)
     assert found.effects == ((("tether",), pytest.approx(0.95)),)
     assert [names for names, _ in found.alternatives] == [("tether", "com_offset"), ("tether", "wrench_bias")]
+
+
+def test_where_two_explain_alike_it_is_not_said_that_nothing_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(report, "_described", lambda each, scene: ())
+    verdict = Verdict(1e-4, 0.0, 1, 1, 1.0, 1e-4)
+
+    def said(scale: float, vetoed: bool) -> str:
+        fits: Any = SimpleNamespace(usual_scale=scale, peak=SimpleNamespace(settled=[True]), unexplained=0.0)
+        shares = {("floor_slope",): 0.48, ("com_offset",): 0.46, (): 0.06}
+        weighed = tuple(Weighed(names, fits, np.log(share), share, vetoed) for names, share in shares.items())
+        found = findings_of(fits, weighed, fits, exact=False)
+        assert found.effects == () and any("alike" in note for note in found.notes)
+        return sentence("table", True, verdict, found)
+
+    assert said(1.0, False).endswith("and which of what may explain it is open")
+    assert said(9.0, False).endswith("none of what the library knows") == said(1.0, True).endswith("the library knows")
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -130,6 +130,19 @@ def result_folder(path: Path, *, keep: bool = False) -> Iterator[Path]:
             with suppress(OSError):
                 folder.rmdir()  # only if it is empty
         raise
+
+
+def remove_files(folder: Path, names: Iterable[str]) -> None:
+    """Remove what an earlier run left under these names, so that what lies in a folder is of one run.
+
+    Raises:
+        BringupError: one of them cannot be removed.
+    """
+    for name in names:
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise BringupError(f"{folder / name}: cannot be removed: {error.strerror}; choose another --out") from error
 
 
 def _try_writing(folder: Path, meant: Path) -> None:

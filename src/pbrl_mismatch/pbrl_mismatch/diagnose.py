@@ -179,7 +179,7 @@ def _diagnosed(
 ) -> ObjectDiagnosis:
     """Diagnose one object of a recording; see `diagnose`."""
     track = track_of(recording, name)
-    room = recording.room if len(recording.room) else None
+    room = recording.room if len(recording.room) > 2 else None
     found = _diagnose_object(seed, track, lay_grips(recording, track), room, told, options)
     error = wrench_error(recording, track.motions, body_of(recording.bodies[name], track.motions[0].oriented))
     notes, where = [*found.notes, *_poor_force(error)], None
@@ -261,11 +261,11 @@ def _diagnose_object(
     options: DiagnoseOptions,
 ) -> ObjectDiagnosis:
     first, second, third, fourth = seed.spawn(4)
-    if told is not None:
-        options = options.model_copy(update={"without": (*options.without, *told.effects)})
+    of_model = () if told is None else told.effects
+    options = options.model_copy(update={"without": (*options.without, *of_model)})
     stages = cut_stages(track, options)
     bases = fit_baselines(np.random.default_rng(first), track, stages, options, told)
-    grip = grip_evidence(grips, options.delay_spread) if grips is not None else None
+    grip = grip_evidence(grips, options.delay_spread, of_model) if grips is not None else None
     bases = [beside_motion(each, grip) for each in bases]
     # Which parameters the baseline has at its best is known only now: effects lead it to where they found them.
     explained = explain(second, track, bases, stages, grip, options)

@@ -240,7 +240,7 @@ def _predicted(
         "outline": np.array(shape.footprint),
         "feet": np.array(shape.feet),
     }
-    pivot = com_to_origin(start[:3], com)
+    pivot, held = com_to_origin(start[:3], com), dt * np.arange(count)
     place, out = np.arange(count + 1, dtype=float)[None], np.empty((1, 1, count + 1, 3))
     span, told = np.array([[0, count, 0, count - 1]]), start[None, None]
     heading, last = np.full(count, start[2]), np.full((count + 1, 3), np.inf)
@@ -255,7 +255,7 @@ def _predicted(
             told,
             np.zeros((1, 1, 1, 3)),
             track["felt"],
-            np.ascontiguousarray(np.hstack([turn, arm])),
+            np.column_stack([turn, arm, held]),
             seen,
             track["clock"],
             span,

@@ -84,11 +84,19 @@ class Finding:
 
 @dataclass(frozen=True)
 class Findings:
-    """The named hypothesis, the others, and what must not be read into them."""
+    """The named hypothesis, the others, and what must not be read into them.
+
+    Attributes:
+        effects: named.
+        alternatives: others.
+        notes: sentences.
+        open: whether what is likeliest would be named, were it probable enough.
+    """
 
     effects: tuple[Finding, ...]
     alternatives: tuple[Finding, ...]
     notes: tuple[str, ...]
+    open: bool = False
 
 
 def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *, exact: bool) -> Findings:
@@ -113,7 +121,8 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
     elif left:
         short = f"leaves a wrench that its law does not have ({left})"
     sure = held_by(weighed, best.effects)
-    named = bool(weighed[0].effects) and sure >= NAMED and not short and not best.vetoed
+    sound = bool(weighed[0].effects) and not short and not best.vetoed
+    named = sound and sure >= NAMED
     if short:
         notes.append(f"nothing in the library reaches the noise floor: the likeliest, {names}, {short}")
     if best.vetoed:
@@ -126,7 +135,7 @@ def findings_of(baseline: Fitted, weighed: tuple[Weighed, ...], scene: Scene, *,
     chosen = _described(replace(best, probability=sure), scene) if named else ()
     rest = others[1:] if named else others
     alternatives = tuple(finding for each in rest[:SHOWN] for finding in _described(each, scene))
-    return Findings(chosen, alternatives, tuple(notes))
+    return Findings(chosen, alternatives, tuple(notes), open=sound and not named)
 
 
 def held_otherwise(p_value: float, of_motion: float, level: float) -> str:
@@ -295,7 +304,8 @@ def sentence(name: str, mismatch: bool, verdict: Verdict, found: Findings) -> st
         return f"{name}: model and recording agree (p = {verdict.p_value:.2g})"
     chance = _chance(verdict.p_value)
     if not found.effects:
-        return f"{name}: something is left out ({chance}), and it is none of what the library knows"
+        what = "which of what may explain it is open" if found.open else "it is none of what the library knows"
+        return f"{name}: something is left out ({chance}), and {what}"
     what = " and ".join(finding.effect for finding in found.effects)
     left = "is" if len(found.effects) == 1 else "are"
     return f"{name}: {what} {left} left out ({100 * found.effects[0].probability:.0f} %, {chance})"

@@ -13,6 +13,8 @@ from pbrl_bag.types import Recording
 from pbrl_mismatch.data.cuts import Cuts, cut_windows
 from pbrl_mismatch.data.simulation import poses
 from pbrl_mismatch.diagnose import track_of
+from pbrl_mismatch.kernels.columns import COLUMN
+from pbrl_mismatch.kernels.sense_kernel import acting
 from pbrl_mismatch.search.climb import climb
 from pbrl_mismatch.search.hypothesis import BaselineOptions, Hypothesis, baselines
 from pbrl_mismatch.search.lasting import lasting_wrenches, zero_errors
@@ -69,6 +71,25 @@ def test_an_error_of_the_sensor_s_zero_is_the_same_for_all_of_a_hold_in_its_own_
     force = np.stack([c * error[0] - s * error[1], s * error[0] + c * error[1]], -1)
     moment = (x * force[..., 1] - y * force[..., 0]) / track.gyration + error[2]
     assert zero[..., :3] @ error == pytest.approx(np.concatenate([force, moment[..., None]], -1))
+
+
+def test_a_sensor_that_is_turned_is_felt_as_the_kernel_feels_it(cuts: Cuts, free: Hypothesis) -> None:
+    """The last of the lasting wrenches is what a little turn makes of the felt one, torque about the middle and all."""
+    track = cuts.track
+    turned, out = np.empty((2, len(track.clock), 3)), np.empty(3)
+    for k, turn in enumerate((-1e-4, 1e-4)):
+        row = free.rows(free.mean[None])[0]
+        row[COLUMN["sensor_turn"]] = turn
+        last = len(track.clock) - 1
+        for t in range(last + 1):
+            time = float(track.clock[t])
+            acting(row, track.felt, track.mount, track.seen, t, 0, last, time, track.body, track.body[1:3], out)
+            turned[k, t] = out
+    change = (turned[1] - turned[0]) / [1.0, 1.0, track.gyration]
+    steps = np.arange(len(track.clock)).reshape(1, -1)
+    felt = lasting_wrenches(cuts, steps)[0, ..., -1]
+    along = np.sum(change * felt) / np.sqrt(np.sum(change**2) * np.sum(felt**2))
+    assert abs(along) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_what_passes_is_seen_by_the_other(cuts: Cuts, free: Hypothesis) -> None:

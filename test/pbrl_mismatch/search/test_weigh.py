@@ -19,11 +19,13 @@ from pbrl_mismatch.search.weigh import (
     ASTRAY,
     CLEAR,
     DISCREPANCY,
+    JUDGED,
     LEAVES,
     OF_EXACT,
     OF_HISTORY,
     VETO,
     Weighed,
+    first_judged,
     held_by,
     sure_first,
     veto,
@@ -266,6 +268,22 @@ def test_of_what_is_certain_to_be_there_the_most_is_named(
     assert sorted(each.effects for each in ordered) == sorted(shares)
     rest = [each.log_weight for each in ordered[1:]]
     assert rest == sorted(rest, reverse=True)
+
+
+def test_what_comes_first_was_held_against_what_was_held_out_however_many_went_astray_before_it() -> None:
+    baseline = fitted("free", -400.0)
+    baseline.score = Score(-60.0, 0.02, 0.02, 0.01)
+    tried = [fitted(f"free + law_{k}/0", -100.0 - 3.0 * k) for k in range(2 * JUDGED)]
+    weighed = tuple(Weighed(each.hypothesis.effects, each, each.evidence, 0.1, False) for each in (*tried, baseline))
+
+    def judge(each: Any) -> Any:
+        astray = tried.index(each) <= JUDGED + 1
+        each.score = Score(-160.0 if astray else -50.0, 1.0 if astray else 0.01, 0.02, 0.01)
+        return each
+
+    found = first_judged(veto(weighed, baseline, judge), baseline, judge)
+    assert found[0].effects == (f"law_{JUDGED + 2}",)
+    assert found[0].fitted.score is not None and not found[0].vetoed
 
 
 def test_that_an_effect_is_there_is_as_probable_as_all_that_hold_it_together() -> None:

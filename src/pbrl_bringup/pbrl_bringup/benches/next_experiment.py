@@ -38,6 +38,7 @@ from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.fitted import cut_stages
 from pbrl_mismatch.search.library import search_library
 from pbrl_mismatch.search.weigh import Weighed, weigh
+from pbrl_model.errors import ModelError
 
 Array = NDArray[np.float64]
 
@@ -62,6 +63,8 @@ TRIES = 12
 ROOM = 4.0
 SPEEDS, DURATIONS = (0.02, 0.06), (0.6, 1.2)
 BASELINE = ("free",)
+UNUSABLE = (SimError, BringupError, MismatchError, ModelError)
+"""What a push ends with that cannot be done, or whose recording is refused: it hardly moved, or slid in the hand."""
 QUIET = {"draws": 120, "workers": 1, "most_together": 1}
 
 
@@ -115,10 +118,10 @@ def run_case(group: tuple[str, ...], truth: str, seed: int) -> Told | None:
             table = _Table.drawn(rng, truth)
             first = table.pushed(_first_push(rng, table), 0)
             weighed, _ = weighed_by(first.recording, group, seed)
-        except (SimError, BringupError, MismatchError):  # MismatchError: it hardly moved
+        except UNUSABLE:
             continue
         if max(each.probability for each in weighed) < SURE:
-            run, other = (_until_told(first, group, truth, seed, random=random) for random in (False, True))
+            run, other = (until_told(first, group, truth, seed, random=random) for random in (False, True))
             misled, acted = (run.misled, other.misled), run.acted or other.acted
             begun = _probability(weighed, truth)
             return Told(group, truth, seed, begun, run.pushes, other.pushes, misled, acted, run.bits)
@@ -232,7 +235,7 @@ class _Run:
     bits: tuple[float, ...]
 
 
-def _until_told(table: _Table, group: Sequence[str], truth: str, seed: int, *, random: bool) -> _Run:
+def until_told(table: _Table, group: Sequence[str], truth: str, seed: int, *, random: bool) -> _Run:
     """Push until the truth is told."""
     rng = np.random.default_rng([seed, 3, int(random)])
     reach = Reach(speeds=SPEEDS, durations=DURATIONS, room=table.recording.room)
@@ -245,10 +248,11 @@ def _until_told(table: _Table, group: Sequence[str], truth: str, seed: int, *, r
             break
         bits.append(plan.expected_bits)
         try:
-            table = table.pushed(_as_push(plan), number)
-        except SimError:  # what cannot be done was a push all the same
+            after = table.pushed(_as_push(plan), number)
+            weighed, track = weighed_by(after.recording, group, seed)
+        except UNUSABLE:  # what cannot be done, or read, was a push all the same
             continue
-        weighed, track = weighed_by(table.recording, group, seed)
+        table = after
         if _probability(weighed, truth) >= SURE:
             return _Run(number, misled, table.acted, tuple(bits))
         misled = misled or max(each.probability for each in weighed) >= SURE

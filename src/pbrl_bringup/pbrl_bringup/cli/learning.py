@@ -64,7 +64,8 @@ def diagnose(
         list[str] | None,
         typer.Option(
             help="What is no mismatch: free, caster (one that is locked), wheel, ground, wheel+ground or hinge; or a "
-            "model's file of fit or diagnose. As often as needed, the best counts. Default: free, caster and wheel."
+            "model's file of fit or diagnose, which its object then has alone. As often as needed, the best kind "
+            "counts. Default: free, caster and wheel."
         ),
     ] = None,
     without: Annotated[

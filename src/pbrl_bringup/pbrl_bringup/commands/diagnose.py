@@ -13,11 +13,11 @@ from typing import Any
 from rich.console import Console
 
 from pbrl_bag import Recording, read_recording
-from pbrl_bringup.diagnosis.doors import run_doors, write_doors
+from pbrl_bringup.diagnosis.doors import check_for_doors, run_doors, write_doors
 from pbrl_bringup.diagnosis.models import write_models
 from pbrl_bringup.diagnosis.page import write_diagnosis
-from pbrl_bringup.diagnosis.residuals import RESIDUALS, residuals_to_json
-from pbrl_bringup.files import result_folder, write_json
+from pbrl_bringup.diagnosis.residuals import PAGE, REPORT, RESIDUALS, RESULTS, residuals_to_json
+from pbrl_bringup.files import remove_files, result_folder, write_json
 from pbrl_bringup.scale.address import LOCAL
 from pbrl_bringup.scale.command_line import command_of
 from pbrl_bringup.scale.recordings import choose_recordings
@@ -118,13 +118,14 @@ def command(
         say(f"pbrl: {note}")
     asked_for = "./pbrl " + shlex.join(sys.argv[1:])
     if is_for_doors(recording, tuple(baseline) or None):
+        check_for_doors({"effects": effects, **settings})
         return run_doors(recording, options, out, asked_for)
     with result_folder(out) as folder:
         with Console(stderr=True).status(f"diagnosing (baseline {', '.join(options.baseline)}, seed {seed})"):
             found = diagnose(recording, options)
         write_found(found, recording, folder, asked_for, options)
     print_diagnosis(found)
-    output().print(styled(str(out / "report.html"), "bold"))
+    output().print(styled(str(out / PAGE), "bold"))
     return 0
 
 
@@ -143,6 +144,7 @@ def diagnose_one(bag: Path, folder: Path, asked: Asked) -> list[dict[str, Any]]:
     recording = read_recording(bag, asked.mapping)
     line = command_of("diagnose", bag, folder, **asked.typed)
     if is_for_doors(recording, asked.baseline or None):
+        check_for_doors(asked.typed)
         doors = diagnose_doors(recording, asked.options)
         write_doors(doors, folder, line)
         return [row_of(name, found.report) for name, found in doors.objects.items()]
@@ -191,12 +193,13 @@ def row_of(name: str, report: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_found(found: Diagnosis, recording: Recording, folder: Path, asked_for: str, options: DiagnoseOptions) -> None:
-    """Write the report, what force the model lacks, the models and the page."""
-    write_json(folder / "report.json", found.to_report())
+    """Write what force the model lacks, the models, the page and, when all of it is there, the report."""
+    remove_files(folder, RESULTS)
     residuals = {name: each.residual for name, each in found.objects.items()}
     write_json(folder / RESIDUALS, residuals_to_json(residuals))
     models = write_models(found, folder, options.seed)
-    write_diagnosis(found, recording, asked_for, folder / "report.html", options=options, models=models)
+    write_diagnosis(found, recording, asked_for, folder / PAGE, options=options, models=models)
+    write_json(folder / REPORT, found.to_report())
 
 
 def print_diagnosis(diagnosis: Diagnosis) -> None:

@@ -6,6 +6,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
@@ -15,14 +16,18 @@ from rich.console import Console
 
 from pbrl_bag.types import Recording
 from pbrl_bringup.diagnosis.door_figures import force_against_angle, from_above, held_out, odds
+from pbrl_bringup.diagnosis.residuals import PAGE, REPORT, RESULTS
 from pbrl_bringup.diagnosis.told import Told, told_of_object
-from pbrl_bringup.files import result_folder, write_json, write_text
+from pbrl_bringup.errors import BringupError
+from pbrl_bringup.files import remove_files, result_folder, write_json, write_text
 from pbrl_bringup.report_page import TEMPLATES, number, rounded
 from pbrl_bringup.terminal import output, styled, table
 from pbrl_mismatch.joint.diagnosis import DoorDiagnosis, DoorsDiagnosis, diagnose_doors
 from pbrl_mismatch.options import DiagnoseOptions
 
 SHOWN = 5
+NOT_OF_DOORS = ("effects", "mass_spread", "grasp_spread", "outline_spread", "most_together")
+"""Options of `diagnose` that say nothing of a force along a path: no mass, no outline, laws and sets of its own."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,23 @@ class Part:
     found: DoorDiagnosis
     figures: Mapping[str, Markup]
     told: Told
+
+
+def check_for_doors(typed: Mapping[str, Any]) -> None:
+    """Refuse options that a door's diagnosis would pass over.
+
+    Args:
+        typed: options on the command line, by name.
+
+    Raises:
+        BringupError: one of them was given.
+    """
+    given = [f"--{name.replace('_', '-')}" for name in NOT_OF_DOORS if typed.get(name) not in (None, (), [])]
+    if given:
+        raise BringupError(
+            f"diagnose: expected no {' and no '.join(given)} of a recording of nothing but a path and a force: that is "
+            "diagnosed by the force along the path; leave it out"
+        )
 
 
 def run_doors(recording: Recording, options: DiagnoseOptions, out: Path, asked_for: str) -> int:
@@ -54,14 +76,15 @@ def run_doors(recording: Recording, options: DiagnoseOptions, out: Path, asked_f
             found = diagnose_doors(recording, options)
         write_doors(found, folder, asked_for)
     print_doors(found)
-    output().print(styled(str(out / "report.html"), "bold"))
+    output().print(styled(str(out / PAGE), "bold"))
     return 0
 
 
 def write_doors(found: DoorsDiagnosis, folder: Path, asked_for: str) -> None:
-    """Write the report and the page."""
-    write_json(folder / "report.json", found.to_report())
-    write_text(folder / "report.html", render_doors(found, asked_for))
+    """Write the page and, when that is there, the report."""
+    remove_files(folder, RESULTS)
+    write_text(folder / PAGE, render_doors(found, asked_for))
+    write_json(folder / REPORT, found.to_report())
 
 
 def render_doors(diagnosis: DoorsDiagnosis, command: str) -> str:

@@ -19,6 +19,7 @@ from pbrl_bringup.diagnosis.told import acting_legend, acting_times
 from pbrl_control.planar import placed
 from pbrl_mismatch.data.missing import in_missing
 from pbrl_mismatch.data.residual import ResidualWrench
+from pbrl_mismatch.data.track import origin_of
 from pbrl_mismatch.diagnose import ObjectDiagnosis
 from pbrl_mismatch.observability.strengths import rounded
 
@@ -38,19 +39,25 @@ def floor(body: BodyGeometry, found: ObjectDiagnosis) -> str:
     """Draw the way of the object with the left-out force at its centre of mass, and where effects are."""
     figure, axes = _canvas(7.2, 6.0)
     residual = found.residual
-    time = residual.time
+    time, frame = residual.time, frames(found)
     for sample in _spaced(time, OUTLINE_EVERY):
-        corners = placed(body.footprint, residual.state[sample, :3])
+        corners = placed(body.footprint, frame[sample])
         axes.fill(*corners.T, facecolor="none", edgecolor=GREY, lw=0.6, alpha=0.6)
     for episode in np.split(np.arange(len(time)), residual.first[1:]):
         axes.plot(*residual.state[episode, :2].T, color="black", lw=1.0)
     _arrows(axes, residual)
     for entry in found.report["effects"]:
-        _where(axes, entry, residual.state[-1, :3])
+        _where(axes, entry, frame[-1])
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
     return _svg(figure)
+
+
+def frames(found: ObjectDiagnosis) -> Array:
+    """Return (T, 3) where the object's own frame is along its smoothed path, which is its nominal centre of mass's."""
+    com = found.baseline.peak.objective.cuts.track.body[1:3]
+    return np.stack([origin_of(state, com) for state in found.residual.path])
 
 
 def _arrows(axes: Axes, residual: ResidualWrench) -> None:

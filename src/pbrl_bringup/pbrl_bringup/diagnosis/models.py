@@ -10,7 +10,7 @@ from pbrl_mismatch.diagnose import Diagnosis
 from pbrl_mismatch.repaired import saved_model
 from pbrl_model.model_file import save_model
 
-NOT_KNOWN = "something is left out that the library does not know: this is the baseline, which does not have it either"
+NOT_NAMED = "something is left out that has no name: this is the baseline, which does not have it either"
 
 
 def write_models(diagnosis: Diagnosis, folder: Path, seed: int) -> dict[str, str]:
@@ -27,7 +27,7 @@ def write_models(diagnosis: Diagnosis, folder: Path, seed: int) -> dict[str, str
     files = {}
     seeds = np.random.SeedSequence(seed).spawn(len(diagnosis.objects))
     for own, (name, found) in zip(seeds, diagnosis.objects.items(), strict=True):
-        notes = [*found.notes[1:], *([NOT_KNOWN] if found.unknown else [])]
+        notes = [*found.notes[1:], *([NOT_NAMED] if found.unknown else [])]
         track = found.baseline.peak.objective.cuts.track
         files[name] = f"model_{name}.json"
         save_model(saved_model(np.random.default_rng(own), found.repaired, track, notes), folder / files[name])

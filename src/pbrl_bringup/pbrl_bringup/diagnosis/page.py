@@ -37,7 +37,7 @@ class Part:
         floor: figure, an SVG element, and so are the next three.
         over_time: see `figures`.
         odds: see `figures`.
-        held_out: see `figures`.
+        held_out: see `figures`; nothing where nothing was held out.
         caution: what to mind where the repair forecasts worse, or nothing.
         told: headings with sentences.
         model_file: name of the saved model, or nothing.
@@ -112,7 +112,7 @@ def _part(recording: Recording, name: str, found: ObjectDiagnosis, replay: Repla
         Markup(floor(recording.bodies[name], found)),
         Markup(over_time(found)),
         Markup(odds(found)),
-        Markup(held_out(found)),
+        Markup(held_out(found) if replay.held_out else ""),
         forecast_caution(found.report),
         told_of_object(found.report),
         model,

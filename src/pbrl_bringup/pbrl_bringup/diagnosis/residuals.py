@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-RESIDUALS = "residual.json"
+REPORT, PAGE, RESIDUALS = RESULTS = "report.json", "report.html", "residual.json"
+"""What a diagnosis writes beside models; the first is written last, and says that the rest is there."""
 MOST = 6000
 """Moments of one object in the file; of a longer recording every so many are left out."""
 

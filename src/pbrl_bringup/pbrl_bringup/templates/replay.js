@@ -9,7 +9,9 @@ const APART = 0.75; // Seconds between moments from which on there was no hold i
 // The part of the floor that the object and what is named keep to; a simulation that runs away is cut off.
 function floorBox(data) {
   const points = data.recorded.flatMap((pose) => place(data.outline, pose)).concat(data.hand);
-  const low = [0, 1].map((k) => Math.min(...points.map((p) => p[k]))), high = [0, 1].map((k) => Math.max(...points.map((p) => p[k])));
+  // As arguments of one call they would be too many for the stack.
+  const ends = (of) => [0, 1].map((k) => points.reduce((end, p) => of(end, p[k]), points[0][k]));
+  const low = ends(Math.min), high = ends(Math.max);
   for (const fixed of data.places.filter((each) => !each.onBody)) {
     for (const k of [0, 1]) {
       const reach = 0.6 * (high[k] - low[k]) + 0.3;

@@ -89,6 +89,8 @@ def _readings(track: Track, episode: int, motion: Motion, grasp: Grasp, stream: 
     clock = track.clock[rows]
     keep = (stream.time > clock[0] + MARGIN) & (stream.time < clock[-1] - MARGIN)
     keep &= ~in_missing(stream.time, track.missing)
+    # A pose that has no orientation says where the gripper is, and not where what it holds is.
+    keep &= np.isfinite(stream.position).all(axis=1) & np.isfinite(stream.quaternion).all(axis=1)
     if keep.sum() < LEAST:
         return None
     time, gripper = stream.time[keep], stream.position[keep][:, :2]

@@ -24,12 +24,12 @@ from pbrl_mismatch.search.climbed_on import (
     sets_led,
 )
 from pbrl_mismatch.search.fitted import Fitted, Stages, judged, likeliest_first
-from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way
+from pbrl_mismatch.search.grip import GRASP_COMPLIANCE, GripEvidence, beside_motion, gives_way, moved_on
 from pbrl_mismatch.search.hops import REACHED, hopped
 from pbrl_mismatch.search.library import UNTOLD, search_library, trace
 from pbrl_mismatch.search.path.pins import may_be_pinned
 from pbrl_mismatch.search.predictive import predictive_test
-from pbrl_mismatch.search.weigh import Weighed, sure_first, veto, weigh, worth_of_another
+from pbrl_mismatch.search.weigh import Weighed, first_judged, veto, weigh, worth_of_another
 
 Array = NDArray[np.float64]
 
@@ -89,6 +89,7 @@ def explain(
     if not tried:  # The library has nothing left that this recording could show.
         return Explained(weigh(bases, tried, options), bases, stages, -math.inf)
     bases, given_up = led(bases, tried, stages, options), None
+    tried = moved_on(tried, bases, grip)
     singles = weigh(bases, tried, options)
     if _falls_short(tried) and len(stages.fitted) > 1:
         tried = polished(singles, tried, stages, options, hops=False)
@@ -98,10 +99,11 @@ def explain(
         bases = likeliest_first(bases)
         tried = [beside_motion(each.over_shorter(), grip) for each in tried]
         bases = led(bases, tried, stages, options)
-    tried = [beside_motion(each, grip) for each in polished(weigh(bases, tried, options), tried, stages, options)]
+    tried = moved_on(polished(weigh(bases, tried, options), tried, stages, options), bases, grip)
     # What has hopped is held against what has hopped as well.
     (best,) = hopped(bases[:1], stages.fitted[-1], options, max(each.evidence for each in tried))
     bases = likeliest_first([beside_motion(best, grip), *bases[1:]])
+    tried = moved_on(tried, bases, grip)
     weighed = weigh(bases, tried, options)
     odds = min(_log_odds(singles), _log_odds(weighed))
     for depth in range(1, options.most_together):
@@ -118,14 +120,14 @@ def explain(
         more = _tried(seeds[depth], track, deepest, stages, grip, fewer, least)
         if not more:
             break
-        likely = tuple(each for each in weigh(bases, [*tried, *more], options) if len(each.effects) != depth)
-        tried += [beside_motion(each, grip) for each in polished(likely, more, stages, options, POLISHED_OF_SETS)]
+        likely = tuple(each for each in weigh(bases, [*tried, *more], options) if len(each.effects) in (0, depth + 1))
+        tried = moved_on([*tried, *polished(likely, more, stages, options, POLISHED_OF_SETS)], bases, grip)
         weighed = weigh(bases, tried, options)
     if given_up is not None and (back := with_sets(given_up, weighed, grip, options)) is not None:
         stages, bases, tried = back.stages, back.bases, back.tried
         weighed = weigh(bases, tried, options)
-    led_on = [beside_motion(each, grip) for each in parts_led(weighed, tried, stages, options)]
-    tried = [beside_motion(each, grip) for each in sets_led(weighed, tried, led_on, stages, options)]
+    led_on = moved_on(parts_led(weighed, tried, stages, options), bases, grip)
+    tried = moved_on(sets_led(weighed, tried, led_on, stages, options), bases, grip)
     return Explained(weigh(bases, tried, options), bases, stages, odds)
 
 
@@ -178,7 +180,7 @@ def _lacks(best: Fitted, grip: GripEvidence | None, options: DiagnoseOptions) ->
     """Tell whether something is left out of what explains most: in the motion, or in the gripper's poses beside it."""
     if grip is not None and grip.p_value < options.level:
         peak = best.peak
-        if grip.beyond(best.hypothesis, peak.coordinates[0], peak.covariance(0)) > 0.0:
+        if grip.beyond(best.hypothesis, peak.coordinates[0], peak.covariance(0), options.effects) > 0.0:
             return True
     # Where a simulation is far off, what a wrench explains and the rest of the test are both large.
     return best.noise_scale > REACHED or predictive_test(best.peak, 0).p_value < options.level
@@ -197,7 +199,8 @@ def _runs_away(tried: list[Fitted]) -> bool:
 
 def held_against(explained: Explained, baseline: Fitted, options: DiagnoseOptions) -> tuple[Weighed, ...]:
     """Return the hypotheses, what is to be named first, the likeliest held against what was held out of their fits."""
-    return sure_first(veto(explained.weighed, baseline, partial(judged, stages=explained.stages, options=options)))
+    judge = partial(judged, stages=explained.stages, options=options)
+    return first_judged(veto(explained.weighed, baseline, judge), baseline, judge)
 
 
 def _log_odds(weighed: tuple[Weighed, ...]) -> float:

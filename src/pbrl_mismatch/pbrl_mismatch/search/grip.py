@@ -14,7 +14,7 @@ plates about the true one, the gripper's point swings about it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 
 BETWEEN = GRASP_COMPLIANCE, LATENESS, TAG_OFFSET = "grasp_compliance", "time_offset", "pose_bias"
 """Effects that show between gripper and body."""
+HELD_SOFTLY = f" + {GRASP_COMPLIANCE}/0"
+"""What a hold that gives way adds to the name of the variant that it is laid on."""
 TAG = tuple(parameter.column for parameter in TAG_PARAMETERS)
 NEW_RUBBER, NEW_RUBBER_SPREAD = 5e-5, 3e-5
 """Compliance of a hold that is as it should be [m/N]."""
@@ -124,11 +126,11 @@ class GripEvidence:
         A stream that is late may be the body's poses or the wrenches: only the first shows against the gripper.
 
         Args:
-            hypothesis: with effects.
+            hypothesis: with effects, and those of a model that was told.
             coordinates: (K,) mean of what its motion says.
             covariance: (K, K).
         """
-        effects, columns = hypothesis.effects, hypothesis.columns
+        effects, columns = {*hypothesis.effects, *hypothesis.told}, hypothesis.columns
         mean, spread = np.zeros(3), np.zeros((3, 3))
         free = [k for k, name in enumerate(TAG) if name in columns]
         there = [columns.index(TAG[k]) for k in free]
@@ -140,18 +142,21 @@ class GripEvidence:
 
         return float(np.logaddexp(of(False), of(True)) - np.log(2.0)) if LATENESS in effects else of(False)
 
-    def beyond(self, hypothesis: Hypothesis, coordinates: Array, covariance: Array) -> float:
-        """Return how much likelier the readings are with the best of their effects that a hypothesis lacks [nat].
+    def beyond(self, hypothesis: Hypothesis, coordinates: Array, covariance: Array, among: Collection[str]) -> float:
+        """Return how much likelier the readings are with the best of some effects that a hypothesis lacks [nat].
+
+        Where it lacks none of them that would show there it is minus infinity.
 
         Args:
             hypothesis: that is to explain them.
             coordinates: (K,) mean of what its motion says.
             covariance: (K, K).
+            among: names of the effects.
         """
         known = self.beside(hypothesis, coordinates, covariance)
         gained = [-math.inf]
         for name, added in ((GRASP_COMPLIANCE, ()), (LATENESS, ()), (TAG_OFFSET, TAG_PARAMETERS)):
-            if name in hypothesis.effects:
+            if name not in among or name in {*hypothesis.effects, *hypothesis.told}:
                 continue
             effects = (*hypothesis.effects, name)
             richer = replace(hypothesis, effects=effects, parameters=(*hypothesis.parameters, *added))
@@ -161,12 +166,13 @@ class GripEvidence:
         return max(gained)
 
 
-def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence | None:
+def grip_evidence(grips: GripTrack, delay_spread: float, told: Collection[str] = ()) -> GripEvidence | None:
     """Weigh what may act between gripper and body; None where the readings are too few to say how noisy they are.
 
     Args:
         grips: readings.
         delay_spread: of a delay that is no fault [s].
+        told: effects of a model that was told: a hold that is as they say is as it should be.
     """
     laws, places, seen = _laws(grips)
     known = _place_spread(places.shape[1])
@@ -195,12 +201,16 @@ def grip_evidence(grips: GripTrack, delay_spread: float) -> GripEvidence | None:
         return GripLaw(value, mean, inverse, tag.T @ unlikely[:, 0], tag.T @ unlikely[:, 1:])
 
     found = {(gives, late): weigh(gives, late) for gives in (False, True) for late in (False, True)}
-    usual = np.array([*stiff, delay_spread])
+    usual = np.array(
+        [*(soft if GRASP_COMPLIANCE in told else stiff), LATE_SPREAD if LATENESS in told else delay_spread]
+    )
+    if TAG_OFFSET in told:  # it is as open as where a grasp is
+        places, known = np.column_stack([places, tag]), np.append(known, np.full(len(TAG), FREE_PLACE))
     mean, wide = _least_squares(laws, places, shifted, usual, noise)
     # No hold gives way against the force: what looks like that is chance, and is no alarm.
     p_value = one_sided(mean, wide, noise.count)
-    prior = np.concatenate([known, usual])
-    return GripEvidence(found, unless_unbelievable(p_value, _misplaced(design, shifted, variance, prior)), wide)
+    off = _misplaced(np.column_stack([places, laws]), shifted, variance, np.concatenate([known, usual]))
+    return GripEvidence(found, unless_unbelievable(p_value, off), wide)
 
 
 def _laws(grips: GripTrack) -> tuple[Array, Array, Array]:
@@ -251,17 +261,17 @@ def _misplaced(design: Array, seen: Array, variance: float, prior: Array) -> flo
         variance: of the whitened noise [m^2].
         prior: (K,) standard deviations.
     """
-    told = prior < FREE_PLACE
-    told[-LEARNED:] = False
-    other = ~told
+    known = prior < FREE_PLACE
+    known[-LEARNED:] = False
+    other = ~known
     precision, pull = design.T @ design / variance, design.T @ seen / variance
     gain = np.linalg.solve(
-        precision[np.ix_(other, other)] + np.diag(prior[other] ** -2.0), precision[np.ix_(other, told)]
+        precision[np.ix_(other, other)] + np.diag(prior[other] ** -2.0), precision[np.ix_(other, known)]
     )
-    root = np.diag(prior[told])
+    root = np.diag(prior[known])
     # In deviations of what is believed; others are put in at their best.
-    information = root @ (precision[np.ix_(told, told)] - precision[np.ix_(told, other)] @ gain) @ root
-    off = root @ (pull[told] - gain.T @ pull[other])
+    information = root @ (precision[np.ix_(known, known)] - precision[np.ix_(known, other)] @ gain) @ root
+    off = root @ (pull[known] - gain.T @ pull[other])
     size, axes = np.linalg.eigh(information)
     shown = size > SHOWS
     statistic = float(np.sum((axes.T @ off)[shown] ** 2 / (size * (1.0 + size))[shown]))
@@ -274,6 +284,32 @@ def beside_motion(fitted: Fitted, grip: GripEvidence | None) -> Fitted:
         return fitted
     beside = grip.beside(fitted.hypothesis, fitted.peak.coordinates[0], fitted.peak.covariance(0))
     return replace(fitted, beside=beside)
+
+
+def moved_on(tried: Sequence[Fitted], grounds: Sequence[Fitted], grip: GripEvidence | None) -> list[Fitted]:
+    """Return what was tried with what each makes of the grippers' poses, where fits have got further.
+
+    A hold that gives way is learned from those alone, beside a motion as that was fitted: where what it was laid on has
+    come to a better top since, it is laid on that.
+
+    Args:
+        tried: hypotheses, in the order that is kept.
+        grounds: baselines.
+        grip: what the grippers' poses say; None where none was seen.
+    """
+    if grip is None:
+        return list(tried)
+    found = [beside_motion(each, grip) for each in tried]
+    ground = {each.hypothesis.variant: each for each in sorted([*grounds, *found], key=lambda each: each.evidence)}
+
+    def again(each: Fitted) -> Fitted:
+        below = ground.get(each.hypothesis.variant.removesuffix(HELD_SOFTLY))
+        if below is None or not each.hypothesis.variant.endswith(HELD_SOFTLY):
+            return each
+        anew = gives_way(below, grip)
+        return anew if anew.evidence > each.evidence else each
+
+    return [again(each) for each in found]
 
 
 def gives_way(fitted: Fitted, grip: GripEvidence) -> Fitted:
@@ -290,7 +326,7 @@ def gives_way(fitted: Fitted, grip: GripEvidence) -> Fitted:
     richer = replace(
         hypothesis,
         effects=(*hypothesis.effects, GRASP_COMPLIANCE),
-        variant=f"{hypothesis.variant} + {GRASP_COMPLIANCE}/0",
+        variant=f"{hypothesis.variant}{HELD_SOFTLY}",
         parameters=(*hypothesis.parameters, *PARAMETERS),
         base=base,
     )

@@ -21,6 +21,8 @@ RANK = 1e-4
 """Directions of the places that are weaker than this share of the strongest are none."""
 LEAST_FREE = 8
 """Numbers that the readings must have beyond what is learned of them, or their noise is not known."""
+NOISELESS = 1e-12
+"""Sum of squares that the richest law is taken to leave at least [m^2]."""
 LASTS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.9, 1.3, 2.0)
 """How long the noise may be like itself [s]; none: each reading's is its own."""
 
@@ -60,7 +62,7 @@ def grip_noise(grips: GripTrack, every: Array, seen: Array) -> GripNoise | None:
         basis, corner = np.linalg.qr(_whitened(kept, own))
         white = _whitened(kept, seen)
         left = white - basis @ (basis.T @ white)
-        rest = float(left @ left)
+        rest = max(float(left @ left), NOISELESS)
         # Both axes have the same correlation: the root of its determinant is one axis's whole.
         likelihood = -float(np.sum(np.log1p(-(kept**2)))) - float(np.sum(np.log(np.abs(np.diag(corner)))))
         return GripNoise(kept, likelihood - 0.5 * count * math.log(rest), rest, count)

@@ -77,6 +77,7 @@ def _inertial(samples: Samples) -> Iterator[Array]:
 
 
 def _turned(track: Track, rows: Index) -> Array:
-    """Return (N, 3, 1) of a force that is felt turned."""
-    cosine, sine, (x, y) = track.mount[rows, 0], track.mount[rows, 1], track.felt[rows, :2].T
-    return np.stack([-sine * x - cosine * y, cosine * x - sine * y, np.zeros(len(rows))], -1)[..., None]
+    """Return (N, 3, 1) of a force that is felt turned, where the gripper holds."""
+    (cosine, sine, along, across), (x, y) = track.mount[rows, :4].T, track.felt[rows, :2].T
+    force = -sine * x - cosine * y, cosine * x - sine * y
+    return np.stack([*force, along * force[1] - across * force[0]], -1)[..., None]

@@ -225,6 +225,24 @@ def sure_first(weighed: Sequence[Weighed]) -> tuple[Weighed, ...]:
     return (sure, *(each for each in weighed if each is not sure))
 
 
+def first_judged(
+    weighed: Sequence[Weighed], baseline: Fitted, judge: Callable[[Fitted], Fitted]
+) -> tuple[Weighed, ...]:
+    """Return hypotheses as `sure_first` does, where what comes first was held against what was held out.
+
+    Args:
+        weighed: hypotheses, likeliest first, after `veto`.
+        baseline: judged.
+        judge: gives a fitted hypothesis its score.
+    """
+    found = sure_first(weighed)
+    for _ in found:
+        if not found[0].effects or found[0].fitted.score is not None or baseline.score is None:
+            break
+        found = sure_first(_ordered([_held_against(found[0], baseline, judge), *found[1:]]))
+    return found
+
+
 def _ordered(entries: Sequence[Weighed]) -> tuple[Weighed, ...]:
     """Return entries likeliest first, with their probabilities among all."""
     weight = np.array([each.log_weight for each in entries])
