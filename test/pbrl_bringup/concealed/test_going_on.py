@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from pbrl_bringup.benches import concealed
+from pbrl_bringup.concealed import pieces
 from pbrl_bringup.concealed.pieces import SCORE, UNMADE
 from pbrl_bringup.concealed.scoring import Score, failed_score
 from pbrl_bringup.concealed.sets import Trial
@@ -82,3 +83,26 @@ def test_what_was_not_begun_in_time_is_counted(
     done = len(part.details["cases"]) + len(part.details["not_made"])
     assert done == 12 and part.details["not_begun"] > 0
     assert {each["set"] for each in part.details["cases"]} == {"clean", "single"}
+
+
+def test_a_bag_that_was_being_written_when_all_ended_is_written_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    killed = [True, False]
+
+    def written(recording: object, path: Path) -> None:
+        path.mkdir(parents=True)
+        write_text(path / "bag_0.mcap", "half")
+        if killed.pop(0):
+            raise KeyboardInterrupt
+        write_text(path / "bag_0.mcap", "whole")
+
+    monkeypatch.setattr(pieces, "write_recording", written)
+    nothing: Any = None
+    with pytest.raises(KeyboardInterrupt):
+        pieces.write_whole(nothing, tmp_path)
+    assert not (tmp_path / pieces.BAG).exists()
+    for _ in range(2):  # what is there is left
+        pieces.write_whole(nothing, tmp_path)
+    assert (tmp_path / pieces.BAG / "bag_0.mcap").read_text() == "whole"
+    assert [each.name for each in tmp_path.iterdir()] == [pieces.BAG]

@@ -203,7 +203,7 @@ def _biased(scores: Sequence[Score]) -> list[Row]:
 
 def _localised(scores: Sequence[Score]) -> list[Row]:
     """Return F1 of ours beside every rival, and how far ours is above the best of them."""
-    partly = [each for each in scores if each.share < ALWAYS and not each.failed]
+    partly = [each for each in scores if each.share < ALWAYS]
     rows: list[Row] = []
     for kind, goal in LOCALISED.items():
         cases = [each for each in partly if not math.isnan(getattr(each.located, kind))]

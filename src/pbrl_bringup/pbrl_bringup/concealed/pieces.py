@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import time
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -33,9 +34,10 @@ from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.options import DiagnoseOptions
 from pbrl_mismatch.search.told_baseline import ToldBaseline, baseline_from_model
 
-SEAL, BAG, BARE, FOUND, SPENT, FAILED, SCORE, UNMADE = (
+SEAL, BAG, PART, BARE, FOUND, SPENT, FAILED, SCORE, UNMADE = (
     "seal.txt",
     "bag",
+    "part",
     "bare",
     "found",
     "spent.json",
@@ -104,8 +106,7 @@ def simulate(trial: Trial, folder: Path) -> MadeTrial | str:
             f"{kept}: expected the seal {seal[:12]}..., got {kept.read_text()[:12]}...: other code made the bag; "
             "remove the folder"
         )
-    if not (folder / BAG).exists():
-        write_recording(made.recording, folder / BAG)
+    write_whole(made.recording, folder)
     write_text(kept, f"{seal}\n")
     return made
 
@@ -125,14 +126,24 @@ def learn(recording: Recording, seed: int, folder: Path) -> tuple[Path, ToldBase
     """
     place, known = folder / f"{BARE}-{seed}", DiagnoseOptions()
     place.mkdir(exist_ok=True)
-    if not (place / BAG).exists():
-        write_recording(recording, place / BAG)
+    write_whole(recording, place)
     diagnose({"without": [name for name in DRAWS if name not in OF_CASTERS]}, place, rivals=False)
     if (place / FAILED).exists():
         raise BringupError(f"{place}: expected a model of the table, got {(place / FAILED).read_text().strip()}")
     path = place / FOUND / f"model_{NAME}.json"
     told = baseline_from_model(path, inertia_spread=known.inertia_spread, delay_spread=known.delay_spread)
     return path, told
+
+
+def write_whole(recording: Recording, folder: Path) -> None:
+    """Write a recording's bag into a folder, whole or not at all, unless it is there."""
+    if (folder / BAG).exists():
+        return
+    part = folder / PART
+    shutil.rmtree(part, ignore_errors=True)
+    write_recording(recording, part / BAG)  # a bag's files have its folder's name
+    (part / BAG).replace(folder / BAG)
+    part.rmdir()
 
 
 def diagnose(options: Mapping[str, Any], folder: Path, *, rivals: bool = True) -> None:
@@ -186,6 +197,8 @@ def judge(trial: Trial, made: MadeTrial, folder: Path) -> Score:
 
 
 def _seconds(folder: Path) -> float:
+    if not (folder / SPENT).exists():
+        return math.nan  # stopped between a diagnosis and this
     told = json.loads((folder / SPENT).read_text())["seconds"]
     return math.nan if told is None else float(told)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrl_bringup.concealed.localisation import Localised, claimed_by_report, localise
+from pbrl_bringup.concealed.localisation import REGIONS, Localised, claimed_by_report, localise
 from pbrl_bringup.concealed.places import moment_error, parameter_bias, place_error
 from pbrl_bringup.concealed.truth import Truth
 from pbrl_bringup.rivals.samples import Interval, Regimes, Samples
@@ -218,6 +218,7 @@ def score(
 
 def failed_score(case: str, truth: Truth, seal: str, why: str, group: str, withheld: tuple[str, ...]) -> Score:
     """Return the score of a diagnosis that ended with an error: nothing was found, and nothing was claimed."""
+    missed = Localised(*(0.0 if truth.effects else math.nan,) * 4)
     return Score(
         case,
         truth.effects,
@@ -234,6 +235,8 @@ def failed_score(case: str, truth: Truth, seal: str, why: str, group: str, withh
         seconds=math.nan,
         set=group,
         withheld=withheld,
+        share=min(truth.share.values(), default=1.0),
+        located=missed if REGIONS & set(truth.effects) else replace(missed, region=math.nan),
         failed=why,
     )
 

@@ -54,13 +54,13 @@ class Samples:
         return found
 
     def intervals(self, chosen: Mask) -> tuple[Interval, ...]:
-        """Return samples (n,) as intervals [s], each half a sample wider than its ends."""
+        """Return samples (n,) as intervals [s] from the first to the last of each run; `inside` gives them back."""
         found: list[Interval] = []
         for time in self.time[chosen]:
-            if found and time - found[-1][1] < 0.75 * EVERY:
-                found[-1] = (found[-1][0], float(time) + 0.5 * EVERY)
+            if found and time - found[-1][1] < 1.25 * EVERY:
+                found[-1] = (found[-1][0], float(time))
             else:
-                found.append((float(time) - 0.5 * EVERY, float(time) + 0.5 * EVERY))
+                found.append((float(time), float(time)))
         return tuple(found)
 
 
