@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shapely import Polygon, contains_xy, distance
+from shapely import points as shapely_points
 
 from pbrl_bag.types import Recording
 from pbrl_mismatch import EFFECTS, MismatchError, track_of
 from pbrl_mismatch.data.cuts import cut_windows
 from pbrl_mismatch.kernels.columns import COLUMN, neutral_row
-from pbrl_mismatch.next_experiment.candidates import Candidates, Reach, candidates_of, inside_by, outline_points
+from pbrl_mismatch.next_experiment.candidates import Candidates, Reach, candidates_of, outline_points
 from pbrl_mismatch.next_experiment.experiment import (
     LOOKED_INTO,
     SEGMENTS,
@@ -204,18 +206,31 @@ def test_candidates_keep_the_body_in_the_room_and_an_open_hand_in_its_cone(track
     yaw = track.seen[-1, 2]
     turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
     corners = track.outline @ turn.T + track.seen[-1, :2]
-    assert inside_by(room, (corners[None] + way[:, None]).reshape(-1, 2)).min() >= reach.margin - 1e-9
+    left = room[0] + reach.margin - 1e-9, room[2] - reach.margin + 1e-9
+    assert np.all((corners[None] + way[:, None] >= left[0]) & (corners[None] + way[:, None] <= left[1]))
     cone = candidates_of(np.random.default_rng(0), track, Reach(gripped=False, most=10_000))
     assert np.all(np.sum(cone.direction * (cone.normal @ turn.T), 1) >= math.cos(math.atan(0.4)))
     tight = 0.1 * ROOM
     assert len(candidates_of(np.random.default_rng(0), track, Reach(room=tight))) == 0
 
 
+def test_no_push_goes_over_a_wall_that_reaches_into_the_room(track: Any) -> None:
+    """A partition ends within the footprint's way, none of whose corners comes near it."""
+    x, y = track.seen[-1, :2]
+    size = float(np.ptp(track.outline, axis=0).max())
+    room = np.array([x, y]) + size * np.array(
+        [[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [0.02, 3.0], [0.02, 0.1], [-0.02, 0.1], [-0.02, 3.0], [-3.0, 3.0]]
+    )
+    assert len(candidates_of(np.random.default_rng(0), track, Reach(room=room))) == 0
+    room[4:6, 1] = y + 2.5 * size
+    assert len(candidates_of(np.random.default_rng(0), track, Reach(room=room))) > 0
+
+
 def test_points_lie_on_the_outline_and_normals_point_inwards() -> None:
     outline = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
     points, normals = outline_points(outline, 8)
-    np.testing.assert_allclose(inside_by(outline, points), 0.0, atol=1e-12)
-    assert np.all(inside_by(outline, points + 0.01 * normals) > 0.0)
+    np.testing.assert_allclose(distance(Polygon(outline).exterior, shapely_points(points)), 0.0, atol=1e-12)
+    assert np.all(contains_xy(Polygon(outline), points + 0.01 * normals))
     np.testing.assert_allclose(np.hypot(*normals.T), 1.0)
 
 

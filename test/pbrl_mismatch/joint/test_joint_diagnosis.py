@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from doors_pulled import bump, noise, opened, pulled, texture
 
 from pbrl_mismatch.errors import MismatchError
 from pbrl_mismatch.joint.diagnosis import diagnose_pull
-from pbrl_mismatch.joint.heldout import in_blocks, noise_of
+from pbrl_mismatch.joint.heldout import correlation_length, in_blocks, noise_of
 from pbrl_mismatch.joint.laws import LAWS, laws_of
 from pbrl_mismatch.joint.significance import p_value
 from pbrl_mismatch.options import DiagnoseOptions
@@ -120,3 +121,21 @@ def test_a_library_without_effects_is_refused() -> None:
             pulled(np.ones(len(angle)), angle),
             OPTIONS.model_copy(update={"without": everything}),
         )
+
+
+@pytest.mark.parametrize("degrees", [6.0, 20.0, 90.0])
+def test_how_far_the_rest_is_alike_does_not_hang_on_a_second_hold(degrees: float) -> None:
+    found = []
+    for seed in range(30):
+        rng, first, second = np.random.default_rng(seed), opened(90.0), opened(degrees)
+        rough = [texture(rng, each, length=5.0) for each in (first, second)]
+        one, other = pulled(rough[0], first), pulled(rough[1], second)
+        both = {
+            name: np.concatenate([getattr(one, name), getattr(other, name)])
+            for name in ("angle", "force", "across", "speed", "sense", "travelled")
+        }
+        number = np.repeat([0, 1], [len(first), len(second)])
+        time = np.concatenate([one.time, other.time + one.time[-1] + 60.0])
+        pull = replace(one, **both, time=time, number=number)
+        found.append(np.degrees(correlation_length(pull, pull.force)))
+    assert 3.0 < np.median(found) < 7.0

@@ -164,6 +164,17 @@ def test_a_slice_is_the_recording_up_to_then(clean: Recording) -> None:
     assert whole.grasps == clean.grasps and len(whole.wrenches["left"].time) == len(clean.wrenches["left"].time)
 
 
+def test_two_grippers_that_take_turns_hold_it_all_along(clean: Recording) -> None:
+    first = clean.grasps[0]
+    half = 0.5 * (first.start + first.end)
+    turns = (replace(first, end=half + 1.0), replace(first, gripper="right", start=half))
+    whole = last_holds(replace(clean, grasps=turns), "table", 1.0)
+    assert whole.grasps == turns and len(whole.wrenches["left"].time) == len(clean.wrenches["left"].time)
+    # Two holds apart are two, whoever held.
+    apart = (replace(first, end=half - 3.0), replace(first, start=half + 1.0))
+    assert last_holds(replace(clean, grasps=apart), "table", 1.0).grasps == apart[1:]
+
+
 def test_too_little_is_not_tested_in_a_batch(clean: Recording) -> None:
     with pytest.raises((ModelError, BagError)):
         batch_p_value(clean, table(), clean.grasps[0].start + 0.05, MonitorOptions())

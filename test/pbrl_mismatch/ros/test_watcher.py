@@ -11,6 +11,7 @@ from watched import AtHand, Stream
 
 from pbrl_bag import write_recording
 from pbrl_bag.types import Recording
+from pbrl_mismatch.online.monitor import Alarm, MismatchMonitor
 from pbrl_mismatch.ros import watcher
 
 
@@ -28,6 +29,21 @@ def test_a_push_that_is_not_seen_to_end_is_diagnosed_after_a_while(
     stream.watcher.step()
     stream.watcher.step()
     assert len(at_hand.asked) == 2, "once"
+
+
+def test_alarms_that_follow_each_other_do_not_put_the_diagnosis_off(
+    at_hand: AtHand, concealed_recording: Callable[..., Recording], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(watcher, "QUIET", math.inf)
+    stream = Stream(write_recording(concealed_recording("floor_slope", 1, seconds=9.0), tmp_path / "bag"))
+
+    def alarmed(_: MismatchMonitor, recording: Recording) -> tuple[Alarm, ...]:
+        held = recording.grasps and recording.grasps[0].end > recording.grasps[0].start + 2.0
+        return (Alarm("table", stream.newest(), 1e-4, 5.0, "free"),) if held else ()
+
+    monkeypatch.setattr(MismatchMonitor, "hear", alarmed)
+    stream.play(lambda: at_hand.asked)
+    assert len(at_hand.asked) == 1
 
 
 def test_what_was_begun_or_asked_for_on_another_clock_is_not_told(

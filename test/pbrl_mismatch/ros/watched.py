@@ -102,8 +102,8 @@ class Stream:
         self.watcher.give({"table": MODEL})
         self.follow()
 
-    def recording(self) -> Recording:
-        return recording_of(self._heard.kept())
+    def recording(self, since: float = -math.inf) -> Recording:
+        return recording_of(self._heard.kept(), since)
 
     def play(self, done: Callable[[], Any] = lambda: False) -> None:
         """Let the watcher hear the bag from its beginning, to its end or until something holds."""

@@ -156,6 +156,54 @@ def test_where_the_oldest_holds_went_for_want_of_memory_the_last_ones_are_a_reco
     assert episodes[0].end > recording.object_poses["table"].time[0]
 
 
+def hears(heard: Heard, topic: str, message: object) -> list[str]:
+    return heard.add(Message(topic, type(message), serialize_message(message)))
+
+
+def goes(heard: Heard, topic: str, begin: float, end: float, frame: str = "world") -> None:
+    """Let a stream have a message every 20 ms."""
+    for time_ in np.arange(begin, end, 0.02).tolist():
+        message = stamped(WrenchStamped() if frame.endswith("_ft") else PoseStamped(), time_, frame)
+        if isinstance(message, PoseStamped):
+            message.pose.orientation.w = 1.0
+        hears(heard, topic, message)
+
+
+STREAMS = {"/wrist_ft/left": "left_ft"} | dict.fromkeys(("/ar_tags/table/pose", "/ar_tags/left_gripper/pose"), "world")
+
+
+def test_what_comes_late_or_twice_is_left_out_and_costs_nothing_else() -> None:
+    heard = Heard(10**8)
+    hears(heard, "/scene", scene())
+    hears(heard, "/grasps", held(["table"], 1.0))
+    for topic, frame in STREAMS.items():
+        goes(heard, topic, 0.0, 4.0, frame)
+        goes(heard, topic, 3.5, 3.6, frame)  # half a second back
+        goes(heard, topic, 4.0, 6.0, frame)
+    twice = stamped(WrenchStamped(), 5.98, "left_ft")
+    twice.wrench.force.x = 3.0
+    hears(heard, "/wrist_ft/left", twice)
+    hears(heard, "/grasps", held([], 5.0))
+    hears(heard, "/grasps", held(["table"], 4.0))
+    recording = recording_of(heard.kept())
+    for stream in (*recording.wrenches.values(), *recording.object_poses.values()):
+        assert len(stream.time) == 300 and np.all(np.diff(stream.time) > 0.0)
+    assert [(grasp.start, grasp.end) for grasp in recording.grasps] == [(1.0, 5.0)]
+
+
+def test_a_body_that_has_left_the_scene_does_not_cost_the_holds_after_it() -> None:
+    heard = Heard(10**8)
+    hears(heard, "/scene", scene())
+    hears(heard, "/grasps", held(["crate"], 1.0))
+    hears(heard, "/grasps", held([], 3.0))
+    hears(heard, "/grasps", held(["table"], 4.0))
+    for topic, frame in STREAMS.items():
+        goes(heard, topic, 0.0, 8.0, frame)
+    with pytest.raises(BagError, match="crate"):
+        recording_of(heard.kept())
+    assert [grasp.object for grasp in recording_of(heard.kept(), since=3.5).grasps] == ["crate", "table"]
+
+
 def test_nothing_heard_is_an_error_that_says_so(context: Context) -> None:
     listener = RecordingListener("listener", context)
     with pytest.raises(BagError, match="got no message"):

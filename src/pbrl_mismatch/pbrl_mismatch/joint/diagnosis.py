@@ -148,7 +148,11 @@ def diagnose_pull(rng: np.random.Generator, pull: Pull, options: DiagnoseOptions
     )
     left = pull.force - repaired.law_force(pull)
     before = pull.force - baseline.law_force(pull)
-    named_blocks = blocks if likely else replace(blocks, after=blocks.before, rmse_after=blocks.rmse_before)
+    named_blocks = (
+        blocks
+        if likely
+        else replace(blocks, after=blocks.before, rmse_after=blocks.rmse_before, score_after=blocks.score_before)
+    )
     report = {
         "mismatch": mismatch,
         "p_value": chance,

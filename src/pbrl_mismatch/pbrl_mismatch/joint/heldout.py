@@ -138,9 +138,14 @@ def noise_of(pull: Pull) -> float:
 
 
 def correlation_length(pull: Pull, left: Array) -> float:
-    """Return the way over which what is left of the force loses all but 1/e of its correlation [rad]."""
-    even = np.linspace(pull.travelled.min(), pull.travelled.max(), len(pull))
-    values = np.interp(even, pull.travelled, left - left.mean())
-    power = np.correlate(values, values, "full")[len(values) - 1 :]
+    """Return the way over which what is left of the force loses all but 1/e of its correlation [rad], over all holds."""
+    holds = [pull.number == number for number in np.unique(pull.number)]
+    ways = [float(np.ptp(pull.travelled[rows])) for rows in holds]
+    step = sum(ways) / max(len(pull) - len(holds), 1)
+    power = np.zeros(len(pull) + 1)
+    for rows, way in zip(holds, ways, strict=True):
+        even = pull.travelled[rows].min() + np.linspace(0.0, way, round(way / step) + 1 if step > 0.0 else 1)
+        values = np.interp(even, pull.travelled[rows], (left - left.mean())[rows])
+        power[: len(values)] += np.correlate(values, values, "full")[len(values) - 1 :]
     below = np.flatnonzero(power < power[0] / math.e)
-    return float((even[1] - even[0]) * (below[0] if len(below) else len(values)))
+    return step * float(below[0] if len(below) else len(pull))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrl_mismatch.data.missing import runs_of
 from pbrl_mismatch.joint.evidence import Explained
 from pbrl_mismatch.joint.heldout import FIRST, HeldOut
 from pbrl_mismatch.joint.laws import ALIKE, Law
@@ -87,10 +88,12 @@ def finding_of(explained: Explained, law: Law, probability: float) -> Finding:
 
 
 def _intervals(pull: Pull, inside: NDArray[np.bool_]) -> list[list[float]]:
-    """Return the intervals of time [s] in which cells are inside."""
-    edges = np.diff(np.concatenate([[0], inside.astype(int), [0]]))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-    return [[float(pull.time[a]), float(pull.time[b])] for a, b in zip(starts, ends, strict=True)]
+    """Return the intervals of time [s] in which cells are inside, hold by hold."""
+    found = []
+    for number in np.unique(pull.number):
+        time = pull.time[pull.number == number]
+        found += [[float(time[a]), float(time[b - 1])] for a, b in runs_of(inside[pull.number == number])]
+    return found
 
 
 def held_out_report(blocks: HeldOut, wider: Sequence[HeldOut], rest: HeldOut | None, noise: float) -> dict[str, Any]:

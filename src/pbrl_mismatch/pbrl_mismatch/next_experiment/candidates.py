@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import Polygon, contains, distance, make_valid, polygons
 
 from pbrl_mismatch.data.track import Track
 from pbrl_mismatch.errors import MismatchError
@@ -145,10 +146,12 @@ def _reached(pushes: Candidates, track: Track, reach: Reach) -> NDArray[np.bool_
         fine &= into > 1.0 / math.sqrt(1.0 + reach.friction**2)
     if reach.room is not None:
         footprint = track.outline @ turn.T + [x, y]
+        room = make_valid(Polygon(reach.room))
         way = pushes.direction * (pushes.speed * pushes.duration)[:, None]
         for share in np.linspace(0.0, 1.0, WAYPOINTS)[1:]:
-            corners = footprint[None] + share * way[:, None]
-            fine &= (inside_by(reach.room, corners.reshape(-1, 2)).reshape(len(pushes), -1) >= reach.margin).all(axis=1)
+            there = polygons(footprint[None] + share * way[:, None])
+            # Not its corners alone: the corner of a wall may reach into it.
+            fine &= contains(room, there) & (distance(room.boundary, there) >= reach.margin)
     return fine
 
 
@@ -161,17 +164,3 @@ def _pose(track: Track) -> tuple[float, float, float]:
         float(y - s * track.body[1] - c * track.body[2]),
         float(yaw),
     )
-
-
-def inside_by(outline: Array, points: Array) -> Array:
-    """Return (n,) how far points (n, 2) lie inside an outline (k, 2) [m]; below zero outside (even-odd rule)."""
-    start, end = outline, np.roll(outline, -1, axis=0)
-    along = end - start
-    away = points[:, None] - start
-    share = np.clip(np.sum(away * along, -1) / np.maximum(np.sum(along**2, -1), 1e-18), 0.0, 1.0)
-    distance = np.hypot(*np.moveaxis(away - share[..., None] * along, -1, 0)).min(axis=1)
-    spans = (start[:, 1] > points[:, None, 1]) != (end[:, 1] > points[:, None, 1])
-    height = np.where(spans, end[:, 1] - start[:, 1], 1.0)
-    crossing = start[:, 0] + (points[:, None, 1] - start[:, 1]) * (end[:, 0] - start[:, 0]) / height
-    odd = np.sum(spans & (points[:, None, 0] < crossing), axis=1) % 2 == 1
-    return np.where(odd, distance, -distance)

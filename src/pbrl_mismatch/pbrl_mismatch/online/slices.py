@@ -62,14 +62,19 @@ def between(recording: Recording, start: float, end: float) -> Recording:
 def last_holds(recording: Recording, name: str, seconds: float) -> Recording:
     """Return the last holds of an object that last so long together [s], each whole, with what comes before them.
 
-    A hold is never cut: its reference reading lies before its beginning.
+    A hold is never cut: its reference reading lies before its beginning. Two grippers that take turns hold it on.
     """
-    end = max((g.end for g in recording.grasps if g.object == name), default=0.0)
-    start, total = end, 0.0
-    for grasp in sorted((g for g in recording.grasps if g.object == name), key=lambda g: -g.end):
-        if total >= seconds:
-            break
-        start, total = min(start, grasp.start), total + grasp.end - grasp.start
+    holds: list[list[float]] = []
+    for hold in holds_of(recording, name):
+        if holds and hold.start <= holds[-1][1]:
+            holds[-1][1] = hold.end
+        else:
+            holds.append([hold.start, hold.end])
+    end = start = holds[-1][1] if holds else 0.0
+    total = 0.0
+    while holds and total < seconds:
+        start, until = holds.pop()
+        total += until - start
     return between(recording, start - BEFORE, end + TAIL)
 
 

@@ -160,7 +160,7 @@ class Watcher:
             for alarm in alarms:
                 self._warn(alarm.verdict)
                 if self._options is not None:
-                    self._gathering[alarm.object] = alarm
+                    self._gathering.setdefault(alarm.object, alarm)  # a later one would put it off
 
     def _begin_diagnoses(self) -> None:
         """Diagnose where enough was heard since the alarm or of the push that was asked for, or nothing more comes."""
@@ -177,7 +177,8 @@ class Watcher:
             self._gathering.pop(alarm.object, None)
             assert self._options is not None
             try:
-                recording = last_holds(self._listener.recording(), alarm.object, self._monitor.options.keep)
+                recording = self._listener.recording(since=alarm.time)
+                recording = last_holds(recording, alarm.object, self._monitor.options.keep)
             except BagError as error:
                 self._say("diagnosis", str(error))
                 continue

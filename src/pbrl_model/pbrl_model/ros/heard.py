@@ -123,6 +123,9 @@ class Heard:
                 return []
             stamp = message.stamp
             notes = self._check_clock(message, stamp)
+            last = self._last.get(message.topic, -math.inf)
+            if stamp < last or (stamp == last and message.topic != GRASPS_TOPIC):
+                return notes  # late, or twice: a recording with it would be refused
             self._last[message.topic] = stamp
             if message.topic == GRASPS_TOPIC:
                 try:
@@ -196,8 +199,12 @@ class Heard:
         return any(start - BEFORE <= stamp <= end + AFTER for start, end in self._holds)
 
 
-def recording_of(messages: Iterable[Message]) -> Recording:
+def recording_of(messages: Iterable[Message], since: float = -math.inf) -> Recording:
     """Return what messages say as a recording.
+
+    Args:
+        messages: as they are kept.
+        since: what was let go of before need not be complete, as where its body has left the scene [s].
 
     Raises:
         BagError: a topic is missing or a stream is malformed.
@@ -205,4 +212,4 @@ def recording_of(messages: Iterable[Message]) -> Recording:
     builder = RecordingBuilder()
     for message in messages:
         builder.add(message.topic, message.decoded())
-    return builder.build("what was heard")
+    return builder.build("what was heard", since=since)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 from functools import partial
 from typing import Any
@@ -110,13 +111,16 @@ class RecordingListener(Node):
         """Return what has been heard since the last call; see `follow`."""
         return self._heard.fresh()
 
-    def recording(self) -> Recording:
+    def recording(self, since: float = -math.inf) -> Recording:
         """Return what has been heard so far and not been forgotten.
+
+        Args:
+            since: what was let go of before need not be complete [s].
 
         Raises:
             BagError: a topic is missing or a stream is malformed.
         """
-        return recording_of(self.kept())
+        return recording_of(self.kept(), since)
 
     def kept(self) -> list[Message]:
         """Return the messages that have been heard so far and not been forgotten; see `recording_of`."""
