@@ -138,7 +138,7 @@ def noise_of(pull: Pull) -> float:
 
 
 def correlation_length(pull: Pull, left: Array) -> float:
-    """Return the way over which what is left of the force loses all but 1/e of its correlation [rad], over all holds."""
+    """Return the way over which what is left of the force loses all but 1/e of its correlation [rad], of all holds."""
     holds = [pull.number == number for number in np.unique(pull.number)]
     ways = [float(np.ptp(pull.travelled[rows])) for rows in holds]
     step = sum(ways) / max(len(pull) - len(holds), 1)
