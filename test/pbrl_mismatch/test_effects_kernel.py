@@ -264,6 +264,12 @@ def test_hidden_hinge_that_was_not_at_rest_pulls_by_what_it_was_off(bench: Any) 
     np.testing.assert_allclose(at_rest, np.tile(start[:3], (len(at_rest), 1)), atol=1e-12)
 
 
+def test_a_pinned_body_whose_tag_is_off_is_at_rest_where_it_was_seen(bench: Any) -> None:
+    off = {"tag_x": 0.06, "tag_y": -0.03, "tag_theta": 0.1}
+    path = bench(np.zeros((200, 3))).run(pivot_stiffness=4000.0, pivot_x=0.5, **off)
+    np.testing.assert_allclose(path, np.broadcast_to(path[:1], path.shape), atol=1e-9)
+
+
 @pytest.mark.parametrize("zeta", [0.1, 0.5])
 def test_hidden_hinge_swings_as_its_give_and_damping_say(bench: Any, zeta: float) -> None:
     dt, stiffness = 5e-4, 2000.0

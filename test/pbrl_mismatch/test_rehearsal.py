@@ -50,6 +50,28 @@ def test_one_walk_is_a_walk_for_each_window(walked: Any, law: str) -> None:
     assert np.ptp(at_once[:, FIRST_CASTER:], axis=0).max() > 0.01
 
 
+@pytest.mark.parametrize(("law", "first", "speed"), [("casters", 16, 0.5), ("met", 300, 0.2)])
+def test_what_follows_is_as_far_at_a_window_s_start_wherever_that_lies(
+    bench: Any, law: str, first: int, speed: float
+) -> None:
+    """A table that goes steadily has a crate ahead by as much at every step, and casters that turn with each."""
+    row, seen = neutral_row(), np.zeros((600, 6))
+    row[COLUMN["mass"]] = 20.0
+    for name, value in LAWS[law].items():
+        row[COLUMN[name]] = value
+    seen[:, 0], seen[:, 3] = speed * DT * np.arange(600), speed
+    track = bench(np.zeros((600, 3))).cuts().track
+    span = np.array([[k, 100, 0, 599] for k in range(first, first + 8)])
+    found = np.zeros((len(span), STATE))
+    rehearse_windows(row, seen, span, track.body, track.outline, track.feet, np.zeros(2), found)
+    ahead = found[:, UNSEEN] - seen[span[:, 0], 0]
+    heading = np.arctan2(found[:, FIRST_CASTER + 1], found[:, FIRST_CASTER])
+    if law == "met":
+        np.testing.assert_allclose(ahead, ahead[0], atol=2e-4)
+    else:
+        assert np.all(np.abs(np.diff(heading)) > 1e-3)
+
+
 def test_a_load_is_at_rest_when_a_grasp_begins_and_swings_later(walked: Any) -> None:
     swing = np.abs(walked(**LAWS["swing"])[0][:, SLOSH : SLOSH + 4]).sum(axis=1)
     begins = SPAN[:, 0] == SPAN[:, 2]

@@ -43,8 +43,9 @@ by no more than this [m]: so rough an outline may be."""
 A_TRACE = 1e-9
 """Sliding friction that every model has when it is asked: beside any that rubs a wheel is solved for together with it,
 else by itself, and what the two ways differ by would be there where nothing acts."""
-UNSEEN_IN_FORCE = frozenset({"pose_bias", "time_offset", "grasp_compliance"})
-"""Effects on what is seen, not on what moves: they act whenever the body is observed."""
+ALWAYS = frozenset({"pose_bias", "time_offset", "grasp_compliance", "com_offset"})
+"""Effects that are there whenever the body is observed: on what is seen, not on what moves, and of where its mass is,
+which is so also while nothing turns it."""
 
 
 def activity(
@@ -61,7 +62,7 @@ def activity(
 
     Returns:
         By effect the intervals (start, end) [s] in order, none where it never reaches the floor; None for effects that
-        no force shows, which act for as long as anybody looks.
+        are there for as long as anybody looks.
 
     Raises:
         MismatchError: an effect is unknown, the row does not fit, or the floor is not above zero.
@@ -84,7 +85,7 @@ def activity(
 def wrench_sizes(
     track: Track, row: Array, effects: Sequence[str], beside: Sequence[str] = ()
 ) -> dict[str, Array | None]:
-    """Return how hard each effect of a fitted model acts, (T,) [N]; None for those that no force shows.
+    """Return how hard each effect of a fitted model acts, (T,) [N]; None for those that are always there.
 
     Args:
         track: what was recorded, in T steps.
@@ -97,7 +98,7 @@ def wrench_sizes(
     """
     if row.shape != (WIDTH,):
         raise MismatchError(f"activity: expected a row of {WIDTH} columns, got shape {row.shape}")
-    shown = [name for name in effects if effect_named(name).name not in UNSEEN_IN_FORCE]
+    shown = [name for name in effects if effect_named(name).name not in ALWAYS]
     found: dict[str, Array | None] = dict.fromkeys(effects)
     if not shown:
         return found

@@ -43,16 +43,20 @@ def contacts(
         mass: see `laws_kernel.springs`.
         inertia: about the centre of mass [kg m^2] now.
         com: see `laws_kernel.springs`.
-        pivot: (3,) pose of the body's frame in which a hidden hinge is at rest, but for what it is told to be off.
+        pivot: (3,) pose of the body's frame, as tags see it, in which a hidden hinge is at rest, but for what it is
+            told to be off.
         outline: (E, 2) footprint, counter-clockwise.
         dt: in which they answer [s].
         damped: `crate_kernel.CRUSHING`, or `LEANING` along a recorded path [s].
         acc: (9,) account.
     """
     if p[at.PIVOT_STIFFNESS] > 0.0:
-        k, c0, s0 = p[at.PIVOT_STIFFNESS], math.cos(pivot[2]), math.sin(pivot[2])
+        # Where the pinned point is in the body, from a pose that tags saw.
+        k, turn = p[at.PIVOT_STIFFNESS], pivot[2] - p[at.TAG_THETA]
+        c0, s0 = math.cos(turn), math.sin(turn)
         dx, dy = p[at.PIVOT_X] - pivot[0], p[at.PIVOT_Y] - pivot[1]
-        ax, ay = c0 * dx + s0 * dy + p[at.PIVOT_OFF_X] - com[0], -s0 * dx + c0 * dy + p[at.PIVOT_OFF_Y] - com[1]
+        ax = c0 * dx + s0 * dy + p[at.TAG_X] + p[at.PIVOT_OFF_X] - com[0]
+        ay = -s0 * dx + c0 * dy + p[at.TAG_Y] + p[at.PIVOT_OFF_Y] - com[1]
         rx, ry = c * ax - s * ay, s * ax + c * ay
         push(acc, rx, ry, k * (p[at.PIVOT_X] - state[0] - rx), k * (p[at.PIVOT_Y] - state[1] - ry))
         give = k * dt + 2.0 * p[at.PIVOT_DAMPING] * math.sqrt(k * mass)

@@ -62,25 +62,52 @@ def rehearse_windows(
         if 1 <= i <= at.CASTER_TURN4 - at.CASTER_TURN2 + 1:
             heading += p[at.CASTER_TURN2 + i - 1]
         state[FIRST_CASTER + 2 * i], state[FIRST_CASTER + 2 * i + 1] = math.cos(heading), math.sin(heading)
-    stride, t, begin = 1 if swings else STRIDES, 0, 0
+    stride, t, begin, near = 1 if swings else STRIDES, 0, 0, np.empty(STATE)
     for w in range(span.shape[0]):
+        first = span[w, FIRST]
         while True:
             if span[w, BEGIN] > begin and t >= span[w, BEGIN]:
                 begin = span[w, BEGIN]
                 state[SLOSH : SLOSH + 4] = state[UNSEEN + 3 :] = 0.0
-            if t >= span[w, FIRST]:
+            if t + stride > first:
                 break
-            to_truth(p, seen[t], body, com, state)
-            c, s = math.cos(state[2]), math.sin(state[2])
-            if casters:
-                turn_casters(p, state, c, s, com, feet, stride * dt)
-            if meets:
-                move_crate(p, outline, state, c, s, com, stride * dt, FOLLOWING)
+            _follow(p, seen, t, stride * dt, body, outline, feet, com, state, casters, meets)
             if swings and t + 1 < seen.shape[0] and t + 1 != span[w, BEGIN]:
+                c, s = math.cos(state[2]), math.sin(state[2])
                 ax, ay = (seen[t + 1, 3] - seen[t, 3]) / dt, (seen[t + 1, 4] - seen[t, 4]) / dt
                 swing_load(p, state, ax, ay, (seen[t + 1, 5] - seen[t, 5]) / dt, c, s, com, dt)
             t += stride
-        memory[w, FIRST_CASTER:] = state[FIRST_CASTER:]
+        near[:] = state
+        since = max(t, span[w, BEGIN])
+        if since > t:
+            near[SLOSH : SLOSH + 4] = near[UNSEEN + 3 :] = 0.0
+        if first > since:
+            # A window begins between two strides: a crate is a centimetre further by then, in touch or not.
+            _follow(p, seen, since, (first - since) * dt, body, outline, feet, com, near, casters, meets)
+        memory[w, FIRST_CASTER:] = near[FIRST_CASTER:]
+
+
+@njit(**LEAF)
+def _follow(
+    p: Array,
+    seen: Array,
+    t: int,
+    seconds: float,
+    body: Array,
+    outline: Array,
+    feet: Array,
+    com: Array,
+    state: Array,
+    casters: bool,
+    meets: bool,
+) -> None:
+    """Let casters and a body that is met go on beside a body that goes on as it was seen to at step `t`."""
+    to_truth(p, seen[t], body, com, state)
+    c, s = math.cos(state[2]), math.sin(state[2])
+    if casters:
+        turn_casters(p, state, c, s, com, feet, seconds)
+    if meets:
+        move_crate(p, outline, state, c, s, com, seconds, FOLLOWING)
 
 
 @njit(cache=True, error_model="numpy")
