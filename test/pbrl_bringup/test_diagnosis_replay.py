@@ -171,6 +171,15 @@ def test_where_nothing_was_held_out_no_forecast_is_shown(
     assert bare.count("<svg") == page.count("<svg") - 1
 
 
+def test_the_key_of_the_arrows_lies_on_the_page(page: str) -> None:
+    key = page[: page.index("N left out")]
+    height = float(re.findall(r'viewBox="0 0 [\d.]+ ([\d.]+)"', key)[-1])
+    corners = re.findall(
+        r"[ML] [-\d.]+ ([-\d.]+)", key[key.rindex("PolyCollection") :].partition("</path>")[0].partition("/>")[0]
+    )
+    assert len(corners) > 4 and all(0.0 < float(y) < height for y in corners)
+
+
 def test_the_floor_has_the_object_where_its_own_frame_is() -> None:
     way = np.array([[1.0, 2.0, 0.0], [1.5, 2.5, 0.5 * np.pi]])
     found: Any = SimpleNamespace(

@@ -48,6 +48,7 @@ def floor(body: BodyGeometry, found: ObjectDiagnosis) -> str:
     _arrows(axes, residual)
     for entry in found.report["effects"]:
         _where(axes, entry, frame[-1])
+    axes.set_title(" ")  # room for the arrows' key, of which the layout knows nothing
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
